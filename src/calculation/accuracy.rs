@@ -10,11 +10,12 @@ use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::model_error::{self, Beyond, ModelError};
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
-    Compatibility, ContactLaw, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, ToothShape,
+    Compatibility, ContactLaw, Deviations, Drive, LawName, LoadCase, LoadParameters, PerContact, SolveError, Stop,
+    ToothShape,
 };
 use utoipa::ToSchema;
 
-use crate::design::{CompatibilityDocument, Design, LawName, ModelDocument, Refinements};
+use crate::design::{Design, ModelDocument, Refinements};
 use crate::forms::{Form, Format, Forms, csv_error};
 use crate::json::word;
 use crate::key::Encode;
@@ -55,9 +56,9 @@ pub struct AccuracyAnswer {
 /// A computation method.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct WayAnswer {
-    /// Form of compatibility.
-    pub compatibility: CompatibilityDocument,
-    /// Contact law.
+    /// The form of compatibility.
+    pub compatibility: Compatibility,
+    /// The contact law.
     pub law: LawName,
     /// Equal intervals of the period. Absent if there is a tolerance.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -89,9 +90,9 @@ pub struct WayAnswer {
 /// A model without an answer.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct UnavailableAnswer {
-    /// Form of compatibility.
-    pub compatibility: CompatibilityDocument,
-    /// Contact law.
+    /// The form of compatibility.
+    pub compatibility: Compatibility,
+    /// The contact law.
     pub law: LawName,
     /// Reason.
     pub code: NoAnswerCode,
@@ -137,7 +138,7 @@ impl Question for Accuracy {
                 let (deviations, max_states) = (Deviations::from(&design.deviations), limits.max_searched_states);
                 let backings = Backings::of(&drive, &draft, &design.parts_parameters()?, design.support());
                 let has_pointed_tips = model_error::has_pointed_tips(&drive);
-                let model = design.complete_model(has_pointed_tips);
+                let model = design.complete_model(&load, has_pointed_tips);
                 let refinements = design.refinements_by_virtual_work(has_pointed_tips);
                 Ok(CheckedAccuracy {
                     drive,
@@ -176,7 +177,7 @@ impl Question for Accuracy {
         })?;
         let (mut ways, mut unavailable) = (Vec::new(), Vec::new());
         for model in models(drive, &parameters, checked.refinements) {
-            let (compatibility, law) = (model.compatibility.into(), model.law.into());
+            let (compatibility, law) = (model.compatibility, model.law.name());
             match Model::new(checked, &model, &own.peaks, stop) {
                 Ok(Some(model)) => model.measure(&mut ways, stop)?,
                 // This form of compatibility would turn a gap into load.
@@ -191,8 +192,8 @@ impl Question for Accuracy {
             }
         }
         let is_own = |way: &&WayAnswer| {
-            way.compatibility == parameters.compatibility.into()
-                && way.law == parameters.law.into()
+            way.compatibility == parameters.compatibility
+                && way.law == parameters.law.name()
                 && way.error <= requested_error
         };
         let cheapest = ways.iter().filter(is_own).min_by(|one, other| one.solve_us.total_cmp(&other.solve_us)).cloned();
@@ -333,8 +334,8 @@ impl<'a> Model<'a> {
         let error = difference(&found.peaks, &self.reference.peaks);
         let expected_model_error = self.reference.expected_error;
         Ok(WayAnswer {
-            compatibility: p.compatibility.into(),
-            law: p.law.into(),
+            compatibility: p.compatibility,
+            law: p.law.name(),
             samples,
             tolerance,
             error,

@@ -26,10 +26,9 @@ pub struct CoincidenceDegreeAnswer {
     pub coincidence_degree: f64,
     /// Range of positions in which a tooth touches the ring's flank.
     pub engagement: EngagementAnswer,
-    /// Number of teeth in mesh over the input angle: in one zone if the zones are equal, otherwise in all zones
-    /// together.
-    pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
-    /// True if the zones are equal.
+    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
+    pub teeth_in_mesh_per_zone: TeethInMesh,
+    /// Whether they are.
     #[serde(skip)]
     #[schema(ignore)]
     zones_are_alike: bool,
@@ -41,30 +40,7 @@ pub struct CoincidenceDegreeAnswer {
     pub findings: Vec<FindingAnswer>,
 }
 
-/// Number of teeth over the input angle: in one zone if the zones are equal, otherwise, or with `deviations`, in all
-/// zones together.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct TeethInMeshAnswer {
-    /// Smallest number.
-    pub min: u64,
-    /// Largest number.
-    pub max: u64,
-}
-
-impl From<TeethInMesh> for TeethInMeshAnswer {
-    fn from(TeethInMesh { min, max }: TeethInMesh) -> Self {
-        Self { min, max }
-    }
-}
-
-impl std::fmt::Display for TeethInMeshAnswer {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { min, max } = self;
-        if min == max { write!(f, "{min}") } else { write!(f, "{min} to {max}") }
-    }
-}
-
-/// The question for the contact ratio.
+/// What is asked.
 #[derive(Debug)]
 pub struct CoincidenceDegree;
 
@@ -92,7 +68,7 @@ impl Question for CoincidenceDegree {
             build: crate::BUILD,
             coincidence_degree: mesh.coincidence_degree(),
             engagement: drive.into(),
-            teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
+            teeth_in_mesh_per_zone: mesh.teeth_in_mesh(),
             zones_are_alike: mesh.zones_are_alike(),
             undercut: drive.into(),
             period_deg: mesh.period_deg(),
@@ -130,7 +106,7 @@ impl CoincidenceDegreeAnswer {
     }
 
     fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let TeethInMeshAnswer { min, max } = self.teeth_in_mesh_per_zone;
+        let TeethInMesh { min, max } = self.teeth_in_mesh_per_zone;
         writeln!(writer, "coincidence degree                  {:.12}", self.coincidence_degree)?;
         let zones = if self.zones_are_alike { "each zone" } else { "all zones" };
         writeln!(writer, "teeth in mesh, {zones}            {min} to {max}")?;

@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 use toothwave_solver::drive::Draft;
 use toothwave_solver::{Contact, SolveError, model_error};
 
-use crate::design::{DeprecatedField, Design};
+use crate::design::{DeprecatedField, Design, RefinementsDocument};
 use crate::field::{FieldCode, contact_name};
 use crate::json::{self, Fault, Tree};
 use crate::no_answer::NoAnswer;
@@ -54,7 +54,7 @@ fn convert_design(tree: &mut Tree) -> Result<(), NoAnswer> {
         remove_switches(tree);
         let by_default: Design = tree.read()?;
         if by_default.refinements(has_pointed_tips) != design.refinements(has_pointed_tips) {
-            let refinements = design.complete_model(has_pointed_tips).refinements;
+            let refinements = RefinementsDocument::only(design.refinements(has_pointed_tips));
             let text = serde_json::to_vec(&refinements).map_err(NoAnswer::internal)?;
             tree.set(&place(&["model", "refinements"]), json::tree(&text)?);
         }

@@ -5,14 +5,12 @@
 use serde::{Deserialize, Serialize};
 use toothwave_solver::backing::Support;
 use toothwave_solver::drawing::DrawingParameters;
-use toothwave_solver::losses::Friction;
+use toothwave_solver::losses::duty::LossParameters;
 use toothwave_solver::parts::{CarrierRadii, PartsParameters};
 use toothwave_solver::profile::{Extent, ProfileParameters};
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::{OfDutyPoint, SHARES_TOLERANCE};
-use toothwave_solver::{
-    Compatibility, DriveParameters, LoadParameters, Material, Materials, Parameter, PerContact, Torque, Violation,
-};
+use toothwave_solver::{DriveParameters, LoadParameters, Material, Materials, Parameter, Torque, Violation};
 use utoipa::ToSchema;
 
 use crate::field::FieldCode;
@@ -180,7 +178,9 @@ impl Design {
                     Parameter::ToothCount => count.0,
                     Parameter::InstalledTeeth => installed.unwrap_or(count).0,
                     Parameter::RingTeeth => self.drive.ring.teeth.0,
-                    Parameter::Lobes => self.drive.wave_generator.lobes().map_or(value, |lobes| lobes.0),
+                    Parameter::Lobes | Parameter::HarmonicLobes => {
+                        self.drive.wave_generator.lobes().map_or(value, |lobes| lobes.0)
+                    }
                     _ => value,
                 };
                 Some(Violation::OutOfRange { parameter, value, limit })
@@ -207,10 +207,6 @@ impl Design {
             youngs_modulus_gpa: document.youngs_modulus_gpa,
             poissons_ratio: document.poissons_ratio,
         };
-        let compatibility = match self.model.compatibility {
-            CompatibilityDocument::Projection => Compatibility::Projection,
-            CompatibilityDocument::VirtualWork => Compatibility::VirtualWork,
-        };
         let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.refinements(has_pointed_tips);
         Ok(LoadParameters {
             materials: Materials {
@@ -220,9 +216,9 @@ impl Design {
                 carrier: material(&self.materials.carrier),
             },
             torque,
-            compatibility,
+            compatibility: self.model.compatibility,
             law: (&self.stiffness()).into(),
-            series_compliance_mm_per_n: (&self.model.series_compliance_mm_per_n).into(),
+            series_compliance_mm_per_n: self.model.series_compliance_mm_per_n.given().unwrap_or_default(),
             ring_teeth_bend,
             wave_generator_moves,
             corner_contact,
@@ -321,30 +317,13 @@ impl Design {
         Ok(violations)
     }
 
-    /// Returns the wear rates of the parts, if given.
-    pub fn wear_rate_mm3_per_nm(&self) -> Option<PerContact<f64>> {
-        self.friction.as_ref().and_then(FrictionDocument::wear_rate_mm3_per_nm)
-    }
-
-    /// Returns the data for the life of the wave generator's bearing, if a load rating is given.
-    pub fn bearing_rating(&self) -> Option<BearingRating> {
-        self.friction.as_ref().and_then(FrictionDocument::bearing_rating)
-    }
-
-    /// Returns the friction, if given.
+    /// What a sweep is asked about friction, where there is any.
     ///
     /// # Errors
-    /// Every value that is out of its range.
-    pub fn friction(&self) -> Result<Option<Friction>, Vec<Violation>> {
-        let Some(document) = &self.friction else { return Ok(None) };
-        let mut violations = document.violations_beside();
-        if document.bearing_rating().is_some() && !self.drive_parameters().wave_generator.is_eccentric_circle() {
-            violations.push(Violation::NoBearingLife);
-        }
-        match Friction::new(&document.into()) {
-            Ok(friction) if violations.is_empty() => Ok(Some(friction)),
-            friction => Err(violations.into_iter().chain(friction.err().into_iter().flatten()).collect()),
-        }
+    /// Every value that is out of its range, and a rating of a bearing that this wave generator has not.
+    pub fn loss_parameters(&self) -> Result<Option<LossParameters>, Vec<Violation>> {
+        let is_eccentric = self.drive_parameters().wave_generator.is_eccentric_circle();
+        self.friction.as_ref().map(|friction| friction.loss_parameters(is_eccentric)).transpose()
     }
 
     /// Returns the input angles of the sweep.
@@ -400,7 +379,7 @@ impl Design {
     /// Returns the supports of the parts, as far as given.
     pub fn support(&self) -> Support {
         let PartsDocument { ring, carrier, .. } = &self.parts;
-        Support { fingers: carrier.fingers.map(Into::into), rim: ring.rim.map(Into::into) }
+        Support { fingers: carrier.fingers, rim: ring.rim }
     }
 
     /// Returns the parameters of a drawing.

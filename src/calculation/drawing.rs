@@ -6,7 +6,7 @@ use toothwave_solver::{SolveError, Stop};
 
 use crate::design::Design;
 use crate::drawing::answer::{BodyAnswer, DrawingAnswer, DrawnPart, EdgeAnswer, OutlineAnswer};
-use crate::findings::{FindingAnswer, drive_findings};
+use crate::findings::{Causes, FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};
 use crate::key::{Encode, Key};
 use crate::no_answer::NoAnswer;
@@ -30,6 +30,7 @@ pub struct CheckedDrawing {
     chord_tolerance_mm: f64,
     input_angle_deg: Option<f64>,
     of_document: Vec<FindingAnswer>,
+    causes: Causes,
 }
 
 /// A point's coordinates.
@@ -65,7 +66,8 @@ impl Question for Drawing {
         let of_design = (&design.drive, design.parts_in_key(), &design.modification, design.profile.chord_tolerance_mm);
         let parameters = design.drawing_parameters(limits.max_profile_points);
         let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
-        let drawing = solver::Drawing::new(&draft, subject.subject(), &design.parts_parameters()?, &parameters);
+        let parts = design.parts_parameters()?;
+        let drawing = solver::Drawing::new(&draft, subject.subject(), &parts, &parameters);
         let drawing = drawing.map_err(|error| match error {
             DriveError::Impossible(violations) => NoAnswer::impossible(&design.as_written(&violations)),
             error @ DriveError::NotConverged(_) => error.into(),
@@ -75,6 +77,11 @@ impl Question for Drawing {
             design_hash: Key::new("design", &of_design, &(Format::Json, false)).to_string(),
             subject,
             of_document: FindingAnswer::of_document(design, false),
+            causes: Causes {
+                ring_clearance: parts.ring_clearance_um > 0.0,
+                ring_equidistant: parts.modification.ring_equidistant_um > 0.0,
+                ..Causes::default()
+            },
             chord_tolerance_mm: parameters.chord_tolerance_mm,
             input_angle_deg: (subject == DrawnPart::Assembly).then_some(parameters.input_angle_deg),
         })
@@ -91,7 +98,7 @@ impl Question for Drawing {
         let of_parts = checked.drawing.findings().map_err(SolveError::from)?;
         let drive = checked.drawing.drive();
         let mut findings = drive_findings(drive)?;
-        findings.extend(of_parts.iter().map(|finding| FindingAnswer::new(finding, drive)));
+        findings.extend(of_parts.iter().map(|finding| FindingAnswer::new(finding, drive, checked.causes)));
         findings.extend(checked.of_document.iter().cloned());
         Ok(DrawingAnswer {
             solver_version: toothwave_solver::VERSION,

@@ -194,7 +194,7 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::SemiMinor => "/drive/wave_generator/semi_minor_mm".into(),
         Parameter::EccentricRadius => "/drive/wave_generator/radius_mm".into(),
         Parameter::Eccentricity => "/drive/wave_generator/eccentricity_mm".into(),
-        Parameter::Lobes => "/drive/wave_generator/lobes".into(),
+        Parameter::Lobes | Parameter::HarmonicLobes => "/drive/wave_generator/lobes".into(),
         Parameter::MeanRadius => "/drive/wave_generator/mean_radius_mm".into(),
         Parameter::MeanPathRadius => "/drive/wave_generator/mean_path_radius_mm".into(),
         Parameter::Amplitude => "/drive/wave_generator/amplitude_mm".into(),

@@ -1,10 +1,11 @@
 //! The steps from a document to an answer, which all questions share.
 
 pub use toothwave_solver::Stop;
+use toothwave_solver::backing::Backings;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::{LoadCase, Parameter, SolveError, Violation, model_error};
 
-use crate::design::Design;
+use crate::design::{Design, SeriesComplianceDocument};
 use crate::forms::{Format, Forms};
 use crate::key::{Encode, Key};
 use crate::no_answer::NoAnswer;
@@ -108,7 +109,13 @@ pub(crate) fn checked_load(
     violations: &mut Vec<Violation>,
 ) -> Result<Option<LoadCase>, NoAnswer> {
     let has_pointed_tips = draft.drive().is_some_and(|drive| model_error::has_pointed_tips(&drive));
-    let parameters = design.load_parameters(has_pointed_tips)?;
+    let mut parameters = design.load_parameters(has_pointed_tips)?;
+    if design.model.series_compliance_mm_per_n == SeriesComplianceDocument::Estimated
+        && let Some(drive) = draft.drive()
+    {
+        let backings = Backings::of(&drive, draft, &design.parts_parameters()?, design.support());
+        parameters.series_compliance_mm_per_n = backings.series_compliance_mm_per_n(&drive, &parameters);
+    }
     let duty = design.duty()?;
     // The torques of a duty have their own fields.
     let of_duty = |violation: &Violation| {

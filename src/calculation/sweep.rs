@@ -2,9 +2,10 @@
 
 use std::io::{self, Write};
 
+use serde::Serialize;
 use toothwave_solver::backing::{Backings, Shares};
-use toothwave_solver::losses::wear::WearParameters;
-use toothwave_solver::losses::{Friction, Mechanism, period};
+use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, LossParameters, LossTotals, PointLosses};
+use toothwave_solver::losses::{Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
 use toothwave_solver::{
@@ -12,9 +13,9 @@ use toothwave_solver::{
     model_error as error_of_model,
 };
 
-use crate::design::{BearingRating, Design, Duty, DutyPoint, ModelDocument};
+use crate::design::{self, Design, ModelDocument};
 use crate::field::FieldCode;
-use crate::findings::{FindingAnswer, drive_findings, write_findings};
+use crate::findings::{Causes, FindingAnswer, drive_findings, write_findings};
 use crate::forms::{Form, Format, Forms, csv_error};
 use crate::json::word;
 use crate::key::Encode;
@@ -23,19 +24,14 @@ use crate::question::{Limits, Question, checked_drive, checked_load, require_fin
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
-use crate::sweep::losses::{
-    BearingLoaded, Cost, Costs, LossTotalsAnswer, LossesAnswer, RadialForceAnswer, RollsAnswer,
-};
-use crate::sweep::model_error::ModelErrorAnswer;
+use crate::sweep::losses::{LossesAnswer, RadialForceAnswer, RollsAnswer};
 
 pub mod answer;
 mod arrow;
 pub mod backing;
-pub mod contact;
 pub mod duty;
 pub mod losses;
-pub mod model_error;
-pub mod peak;
+mod model_error;
 pub mod peaks_only;
 mod plots;
 
@@ -45,12 +41,11 @@ pub struct CheckedSweep {
     drive: Drive,
     model: ModelDocument,
     of_document: Vec<FindingAnswer>,
-    duty: CheckedDuty,
+    duty: Duty,
+    is_duty: bool,
     deviations: Deviations,
     backings: Backings,
-    friction: Option<Friction>,
-    wear_rate_mm3_per_nm: Option<PerContact<f64>>,
-    bearing_rating: Option<BearingRating>,
+    losses: Option<LossParameters>,
     points: Points,
     with_gaps: bool,
     with_wind_up: bool,
@@ -81,14 +76,15 @@ impl CheckedSweep {
         const LOSSES_ANGLE_BYTES: u64 = 9 * 8;
         // Three columns of depths, of each point of a duty and of their mean.
         const WEAR_BYTES: u64 = 3 * 8;
-        let Self { duty, friction, wear_rate_mm3_per_nm, .. } = self;
+        let Self { duty, losses, .. } = self;
+        let has_wear = losses.is_some_and(|losses| losses.wear_rate_mm3_per_nm.is_some());
         let of = |is_asked, bytes| if is_asked { bytes } else { 0 };
         // With friction every point is swept, one after the other beside the hardest.
-        let sweeps = 1 + of(friction.is_some() && duty.points.len() > 1, 1);
-        let of_wear = (duty.points.len() as u64 + 1) * of(wear_rate_mm3_per_nm.is_some(), WEAR_BYTES);
+        let sweeps = 1 + of(losses.is_some() && duty.points.len() > 1, 1);
+        let of_wear = (duty.points.len() as u64 + 1) * of(has_wear, WEAR_BYTES);
         Each {
-            state_bytes: sweeps * (STATE_BYTES + of(friction.is_some(), LOSSES_BYTES)) + of_wear,
-            angle_bytes: sweeps * (ANGLE_BYTES + of(friction.is_some(), LOSSES_ANGLE_BYTES)),
+            state_bytes: sweeps * (STATE_BYTES + of(losses.is_some(), LOSSES_BYTES)) + of_wear,
+            angle_bytes: sweeps * (ANGLE_BYTES + of(losses.is_some(), LOSSES_ANGLE_BYTES)),
         }
     }
 
@@ -99,7 +95,7 @@ impl CheckedSweep {
 
     /// Its load, of a duty the hardest.
     pub fn load(&self) -> &LoadCase {
-        &self.duty.hardest().load
+        self.duty.hardest()
     }
 
     /// What its single items deviate by.
@@ -109,7 +105,8 @@ impl CheckedSweep {
 
     /// The same, of which wear and the life of a bearing are not asked.
     pub fn without_wear(self) -> Self {
-        Self { wear_rate_mm3_per_nm: None, bearing_rating: None, ..self }
+        let losses = self.losses.map(|losses| LossParameters { wear_rate_mm3_per_nm: None, bearing: None, ..losses });
+        Self { losses, ..self }
     }
 
     /// What a finger of the carrier, as it is held, adds to a tooth's approach at its contacts at the peaks of the load, over that; nothing where
@@ -120,19 +117,40 @@ impl CheckedSweep {
         of_finger.map(|(_, share)| share)
     }
 
-    /// What friction takes over all points of a duty, as the answer has it, given the sweep of the hardest; nothing without friction.
+    /// What friction takes over all points of a duty, given the sweep of the hardest; nothing without friction.
     ///
     /// # Errors
     /// As [`Self::solve`].
-    pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotalsAnswer>, NoAnswer> {
-        let Some(friction) = &self.friction else { return Ok(None) };
-        let forces = match self.bearing_rating {
-            Some(_) => period::RadialForces::of(&self.drive, self.load(), &self.deviations, hardest, stop)?,
-            None => None,
+    pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotals>, SolveError> {
+        let forces = match self.losses {
+            Some(LossParameters { bearing: Some(_), .. }) => self.radial_forces(hardest, stop)?,
+            _ => None,
         };
-        let losses = self.losses(self.load(), hardest, friction, stop)?;
-        let costs = self.costs(friction, &Swept { sweep: hardest, forces: forces.as_ref() }, &losses, stop)?;
-        Ok(Some(costs.totals(self.duty.hardest, &hardest.states)))
+        Ok(self.losses(hardest, forces.as_ref(), stop)?.map(|losses| losses.totals))
+    }
+
+    /// What friction takes, given the sweep of the hardest point; nothing without friction.
+    fn losses(
+        &self,
+        hardest: &solver::Sweep,
+        forces: Option<&period::RadialForces>,
+        stop: &dyn Stop,
+    ) -> Result<Option<DutyLosses>, SolveError> {
+        let Self { drive, deviations, points, duty, .. } = self;
+        let of_duty = DutySweep { drive, deviations, points: *points, duty };
+        self.losses.as_ref().map(|parameters| of_duty.losses(parameters, hardest, forces, stop)).transpose()
+    }
+
+    /// What the teeth push the wave generator aside with.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub fn radial_forces(
+        &self,
+        sweep: &solver::Sweep,
+        stop: &dyn Stop,
+    ) -> Result<Option<period::RadialForces>, SolveError> {
+        period::RadialForces::of(&self.drive, self.load(), &self.deviations, sweep, stop)
     }
 
     /// Solves, of a duty its hardest point.
@@ -140,11 +158,7 @@ impl CheckedSweep {
     /// # Errors
     /// As [`solver::sweep_with_deviations`].
     pub fn solve(&self, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
-        self.solve_under(self.load(), stop)
-    }
-
-    fn solve_under(&self, load: &LoadCase, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
-        solver::sweep_with_deviations(&self.drive, load, &self.deviations, self.points, stop)
+        solver::sweep_with_deviations(&self.drive, self.load(), &self.deviations, self.points, stop)
     }
 
     /// Solves for the peaks alone.
@@ -159,39 +173,15 @@ impl CheckedSweep {
     }
 }
 
-/// The loads that are swept, one at least.
-#[derive(Debug)]
-struct CheckedDuty {
-    points: Vec<CheckedDutyPoint>,
-    hardest: usize,
-    is_asked: bool,
-}
-
-#[derive(Debug)]
-struct CheckedDutyPoint {
-    load: LoadCase,
-    input_speed_rpm: Option<f64>,
-    share_of_time: f64,
-}
-
-impl CheckedDuty {
-    /// The loads of a document of which the hardest was checked, as all others but their torques were.
-    fn new(design: &Design, hardest: &LoadCase) -> Result<Self, NoAnswer> {
-        let Duty { points, hardest: at, is_asked } = design.duty()?;
-        let points: Result<Vec<_>, _> = points
-            .iter()
-            .map(|&DutyPoint { torque, input_speed_rpm, share_of_time }| {
-                let load = LoadCase::new(&LoadParameters { torque, ..*hardest.parameters() })?;
-                Ok(CheckedDutyPoint { load, input_speed_rpm, share_of_time })
-            })
-            .collect();
-        let points = points.map_err(|violations: Vec<_>| NoAnswer::impossible(&violations))?;
-        Ok(Self { points, hardest: at, is_asked })
-    }
-
-    fn hardest(&self) -> &CheckedDutyPoint {
-        &self.points[self.hardest]
-    }
+/// The loads of a document of which the hardest was checked, as all others but their torques were.
+fn checked_duty(duty: &design::Duty, hardest: &LoadCase) -> Result<Duty, NoAnswer> {
+    let point = |&design::DutyPoint { torque, input_speed_rpm, share_of_time }: &design::DutyPoint| {
+        let load = LoadCase::new(&LoadParameters { torque, ..*hardest.parameters() })?;
+        Ok(DutyPoint { load, input_speed_rpm, share_of_time })
+    };
+    let points = duty.points.iter().map(point).collect::<Result<_, _>>();
+    let points = points.map_err(|violations: Vec<_>| NoAnswer::impossible(&violations))?;
+    Ok(Duty { points, hardest: duty.hardest })
 }
 
 /// What is asked.
@@ -216,7 +206,7 @@ impl Question for Sweep {
         let draft = checked_drive(design, &mut violations)?;
         // In the document's order: of structural faults the first is told.
         let load = checked_load(design, &draft, &mut violations)?;
-        let friction = design.friction().unwrap_or_else(|found| {
+        let losses = design.loss_parameters().unwrap_or_else(|found| {
             violations.extend(found);
             None
         });
@@ -229,8 +219,9 @@ impl Question for Sweep {
             }
         };
         let deviations = Deviations::from(&design.deviations);
+        let duty = design.duty()?;
         if let Points::Samples(samples) = points {
-            let sweeps = design.duty()?.points.len() as u64;
+            let sweeps = duty.points.len() as u64;
             let (states, limit) = (sweeps * load.mesh(&drive, &deviations).state_count(samples), limits.max_states);
             if states > limit {
                 let of_duty = if sweeps > 1 { ", times the points of the duty" } else { "" };
@@ -244,17 +235,16 @@ impl Question for Sweep {
         let with_gaps = load.has_gaps() || !deviations.is_nil();
         let parts = design.parts_parameters()?;
         let backings = Backings::of(&drive, &draft, &parts, design.support());
-        let model = design.complete_model(error_of_model::has_pointed_tips(&drive));
+        let model = design.complete_model(&load, error_of_model::has_pointed_tips(&drive));
         Ok(CheckedSweep {
             model,
             of_document: FindingAnswer::of_document(design, true),
             backings,
             drive,
-            duty: CheckedDuty::new(design, &load)?,
+            duty: checked_duty(&duty, &load)?,
+            is_duty: duty.is_asked,
             deviations,
-            friction,
-            wear_rate_mm3_per_nm: design.wear_rate_mm3_per_nm(),
-            bearing_rating: design.bearing_rating(),
+            losses,
             points,
             with_gaps,
             with_wind_up: design.sweep.wind_up,
@@ -273,11 +263,11 @@ impl Question for Sweep {
     fn is_short(checked: &CheckedSweep) -> bool {
         /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
         const FEW_STATES: u64 = 400;
-        let CheckedSweep { drive, deviations, friction, points, with_gaps, .. } = checked;
+        let CheckedSweep { drive, deviations, losses, points, with_gaps, .. } = checked;
         let load = checked.load();
         // The boundary elements of a tooth take longer than any short sweep.
         let is_plain =
-            !with_gaps && friction.is_none() && !load.parameters().ring_teeth_bend && !load.presses_corners(drive);
+            !with_gaps && losses.is_none() && !load.parameters().ring_teeth_bend && !load.presses_corners(drive);
         match points {
             Points::Samples(samples) => is_plain && deviations.mesh(drive).state_count(*samples) <= FEW_STATES,
             Points::Tolerance { .. } => false,
@@ -285,7 +275,7 @@ impl Question for Sweep {
     }
 
     fn answer(checked: &CheckedSweep, stop: &dyn Stop) -> Result<SweepAnswer, NoAnswer> {
-        let CheckedSweep { drive, duty, deviations, backings, friction, with_gaps, with_wind_up, .. } = checked;
+        let CheckedSweep { drive, duty, deviations, backings, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
         let asks_without_load = *with_wind_up && *with_gaps;
         let points = if asks_without_load { checked.points.also_without_load() } else { checked.points };
@@ -306,29 +296,20 @@ impl Question for Sweep {
         go_on()?;
         let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
         go_on()?;
-        let forces = period::RadialForces::of(drive, load, deviations, &sweep, stop)?;
-        let (mut of_friction, mut of_bearing) = (None, None);
-        let mut losses = None;
-        let mut points = duty.points.iter().map(|point| DutyPointAnswer::new(drive, point)).collect::<Vec<_>>();
-        if let Some(friction) = friction {
-            let of_period = checked.losses(load, &sweep, friction, stop)?;
-            let costs = checked.costs(friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &of_period, stop)?;
-            for (point, cost) in points.iter_mut().zip(costs.of_points()) {
-                point.efficiency_ring_fixed = Some(cost.efficiency_ring_fixed);
-                point.power_loss_w = cost.power_loss_w;
+        let forces = checked.radial_forces(&sweep, stop)?;
+        let losses = checked.losses(&sweep, forces.as_ref(), stop)?;
+        let duty_answer = checked.is_duty.then(|| DutyAnswer::new(drive, duty, losses.as_ref()));
+        let (losses, of_friction) = match losses {
+            Some(DutyLosses { totals, hardest, findings, .. }) => {
+                (Some(LossesAnswer::new(&Mechanism::of(drive), totals, hardest, &sweep)?), findings)
             }
-            of_friction =
-                findings::of_friction(&Mechanism::of_sweep(drive, &sweep), friction, costs.total_loss_ratio());
-            of_bearing = costs
-                .bearing_load()
-                .and_then(|BearingLoaded { rating_n, load_n }| findings::of_bearing(rating_n, load_n));
-            losses = Some(LossesAnswer::new(&costs, duty.hardest, &sweep, of_period)?);
-        }
+            None => (None, Vec::new()),
+        };
         let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
-        let of_model =
-            of_half_widths.iter().chain(&of_friction).chain(&of_bearing).chain(&of_projection).chain(&of_backing);
+        let of_model = of_half_widths.iter().chain(&of_friction).chain(&of_projection).chain(&of_backing);
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
-        findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive)));
+        let causes = Causes { wave_generator_moves: load.parameters().wave_generator_moves, ..Causes::default() };
+        findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive, causes)));
         findings.extend(checked.of_document.iter().cloned());
         let unloaded_wind_up_deg = if asks_without_load {
             Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
@@ -347,20 +328,16 @@ impl Question for Sweep {
                 output_torque_nm: load.output_torque_nm(drive),
             },
             enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip && !load.presses_corners(drive),
-            peaks: sweep.peaks.into(),
-            teeth_in_mesh_per_zone: mesh.teeth_in_mesh().into(),
-            loaded_teeth_per_zone: sweep.loaded_teeth().into(),
+            peaks: PerContact::of(|contact| (*sweep.peaks.get(contact)).into()),
+            teeth_in_mesh_per_zone: mesh.teeth_in_mesh(),
+            loaded_teeth_per_zone: sweep.loaded_teeth(),
             wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep, unloaded_wind_up_deg)),
-            torque_capacity: sweep.torque_capacity.map(Into::into),
-            duty: duty.is_asked.then(|| DutyAnswer {
-                hardest_point: duty.hardest,
-                mean_input_speed_rpm: duty.mean_input_speed_rpm(),
-                points,
-            }),
+            torque_capacity: sweep.torque_capacity,
+            duty: duty_answer,
             losses,
             radial_force_n,
             model: checked.model.clone(),
-            model_error: ModelErrorAnswer::new(load, model_error),
+            model_error,
             series_compliance_estimates: EstimateAnswer::all(backings, drive, load, shares.as_ref()),
             checks: ChecksAnswer {
                 torque_balance_residual: sweep.torque_balance_residual,
@@ -389,104 +366,24 @@ impl Question for Sweep {
     }
 }
 
-/// A sweep with what its teeth push the wave generator aside with.
-struct Swept<'a> {
-    sweep: &'a solver::Sweep,
-    forces: Option<&'a period::RadialForces>,
-}
-
-impl CheckedSweep {
-    /// What each point of the duty costs; of the hardest the sweep is there already.
-    fn costs<'a>(
-        &'a self,
-        friction: &'a Friction,
-        hardest: &Swept<'_>,
-        losses: &period::Losses,
-        stop: &dyn Stop,
-    ) -> Result<Costs<'a>, NoAnswer> {
-        let Self { drive, duty, bearing_rating, deviations, .. } = self;
-        let of_point = |(at, point): (usize, &CheckedDutyPoint)| {
-            if at == duty.hardest {
-                return self.cost(point, friction, hardest, losses, stop);
+impl DutyAnswer {
+    fn new(drive: &Drive, duty: &Duty, losses: Option<&DutyLosses>) -> Self {
+        let of_point = |(at, &DutyPoint { load, input_speed_rpm, share_of_time }): (usize, &DutyPoint)| {
+            let losses = losses.map(|losses| losses.points[at]);
+            DutyPointAnswer {
+                input_torque_nm: load.input_torque_nm(drive),
+                output_torque_nm: load.output_torque_nm(drive),
+                // Every point of a duty has one.
+                input_speed_rpm: input_speed_rpm.unwrap_or_default(),
+                share_of_time,
+                efficiency_ring_fixed: losses.map(|PointLosses { efficiency_ring_fixed, .. }| efficiency_ring_fixed),
+                power_loss_w: losses.and_then(|losses| losses.power_loss_w),
             }
-            let sweep = self.solve_under(&point.load, stop)?;
-            let forces = period::RadialForces::of(drive, &point.load, deviations, &sweep, stop)?;
-            let losses = self.losses(&point.load, &sweep, friction, stop)?;
-            self.cost(point, friction, &Swept { sweep: &sweep, forces: forces.as_ref() }, &losses, stop)
         };
-        let points = duty.points.iter().enumerate().map(of_point).collect::<Result<_, _>>()?;
-        Ok(Costs { mechanism: Mechanism::of(drive), friction, bearing_rating: *bearing_rating, points })
-    }
-
-    /// What friction takes; of a sweep to a tolerance the means keep it.
-    fn losses(
-        &self,
-        load: &LoadCase,
-        sweep: &solver::Sweep,
-        friction: &Friction,
-        stop: &dyn Stop,
-    ) -> Result<period::Losses, SolveError> {
-        let Self { drive, deviations, points, .. } = self;
-        let losses = period::Losses::of(drive, load, sweep, friction, stop)?;
-        match points {
-            Points::Samples(_) => Ok(losses),
-            Points::Tolerance(tolerance) => {
-                losses.with_mean_to(tolerance.relative(), drive, load, deviations, friction, stop)
-            }
-        }
-    }
-
-    fn cost(
-        &self,
-        point: &CheckedDutyPoint,
-        friction: &Friction,
-        &Swept { sweep, forces }: &Swept<'_>,
-        losses: &period::Losses,
-        stop: &dyn Stop,
-    ) -> Result<Cost, NoAnswer> {
-        let Self { drive, wear_rate_mm3_per_nm, bearing_rating, .. } = self;
-        let &CheckedDutyPoint { ref load, input_speed_rpm, share_of_time } = point;
-        let mechanism = Mechanism::of_sweep(drive, sweep);
-        let turning_rad_per_s = input_speed_rpm.map(|speed_rpm| mechanism.turning_rad_per_s(speed_rpm));
-        let wear = wear_rate_mm3_per_nm
-            .zip(turning_rad_per_s)
-            .map(|(rate_mm3_per_nm, turning_rad_per_s)| {
-                let parameters = WearParameters { rate_mm3_per_nm, turning_rad_per_s };
-                period::Wear::of(drive, load, sweep, losses, friction, &parameters, stop)
-            })
-            .transpose()?;
-        Ok(Cost {
-            input_torque_nm: load.input_torque_nm(drive),
-            input_speed_rpm,
-            share_of_time,
-            mean: losses.mean,
-            pressure_velocity: turning_rad_per_s.map(|turning| losses.pressure_velocity_peaks(sweep, turning)),
-            wear,
-            bearing: bearing_rating.zip(forces).and_then(|(rating, forces)| {
-                period::BearingLoad::of(&mechanism, rating.element, sweep, losses, forces)
-            }),
-        })
-    }
-}
-
-impl CheckedDuty {
-    fn mean_input_speed_rpm(&self) -> f64 {
-        let time: f64 = self.points.iter().map(|point| point.share_of_time).sum();
-        let turned = |point: &CheckedDutyPoint| point.share_of_time * point.input_speed_rpm.unwrap_or_default();
-        self.points.iter().map(turned).sum::<f64>() / time
-    }
-}
-
-impl DutyPointAnswer {
-    fn new(drive: &Drive, point: &CheckedDutyPoint) -> Self {
         Self {
-            input_torque_nm: point.load.input_torque_nm(drive),
-            output_torque_nm: point.load.output_torque_nm(drive),
-            // Every point of a duty has one.
-            input_speed_rpm: point.input_speed_rpm.unwrap_or_default(),
-            share_of_time: point.share_of_time,
-            efficiency_ring_fixed: None,
-            power_loss_w: None,
+            hardest_point: duty.hardest,
+            mean_input_speed_rpm: duty.mean_input_speed_rpm(),
+            points: duty.points.iter().enumerate().map(of_point).collect(),
         }
     }
 }
@@ -498,6 +395,16 @@ enum Column<'a> {
     Counts(&'a [u32]),
     Flags(&'a [bool]),
     Rolls(&'a [RollsAnswer]),
+}
+
+/// An entry of a column.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Entry {
+    Number(f64),
+    Count(u32),
+    Flag(bool),
+    Rolls(RollsAnswer),
 }
 
 impl Forms for SweepAnswer {
@@ -512,7 +419,7 @@ impl Forms for SweepAnswer {
         let of_states: usize = self.columns().iter().map(|(_, column)| column.text_bytes()).sum();
         // Columns that stand by input angle.
         let wind_up = self.wind_up.as_ref().map(|wind_up| 5 * wind_up.input_angle_deg.len());
-        let losses = self.losses.as_ref().map(|losses| 8 * losses.by_input_angle.input_angle_deg.len());
+        let losses = self.losses.as_ref().map(|losses| 4 * losses.by_input_angle.input_angle_deg.len());
         let radial_force = self.radial_force_n.as_ref().map(|force| 3 * force.input_angle_deg.len());
         let numbers: usize = [wind_up, losses, radial_force].into_iter().flatten().sum();
         4096 + of_states + NUMBER_TEXT_BYTES * numbers
@@ -533,6 +440,15 @@ impl Column<'_> {
             Self::Counts(counts) => 5 * counts.len(),
             Self::Flags(flags) => 6 * flags.len(),
             Self::Rolls(rolls) => 17 * rolls.len(),
+        }
+    }
+
+    const fn entry(&self, state: usize) -> Entry {
+        match self {
+            Self::Numbers(numbers) => Entry::Number(numbers[state]),
+            Self::Counts(counts) => Entry::Count(counts[state]),
+            Self::Flags(flags) => Entry::Flag(flags[state]),
+            Self::Rolls(rolls) => Entry::Rolls(rolls[state]),
         }
     }
 
@@ -579,32 +495,14 @@ impl SweepAnswer {
     }
 
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let states = &self.states;
+        let columns = self.columns();
         let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record(self.columns().into_iter().map(|(name, _)| name)).map_err(csv_error)?;
-        for i in 0..states.tooth.len() {
-            let state = (
-                states.input_angle_deg[i],
-                states.tooth[i],
-                states.position_deg[i],
-                states.center_radius_mm[i],
-                states.wave_generator_angle_deg[i],
-                states.ring_angle_deg[i],
-                states.force_wave_generator_n[i],
-                states.force_ring_n[i],
-                states.force_carrier_n[i],
-                states.stress_wave_generator_mpa[i],
-                states.stress_ring_mpa[i],
-                states.stress_carrier_mpa[i],
-            );
-            // A column that is not there has no field.
-            let lobe = states.lobe.as_ref().map_or(&[][..], |lobe| &lobe[i..=i]);
-            let loaded = states.loaded.as_ref().map_or(&[][..], |loaded| &loaded[i..=i]);
-            let slips = self.losses.as_ref().map(|LossesAnswer { slip_mm_per_rad: slip, rolls, .. }| {
-                ([slip.wave_generator[i], slip.ring[i], slip.carrier[i]], [rolls[i]])
-            });
-            let (slips, rolls) = slips.as_ref().map_or((&[][..], &[][..]), |(slips, rolls)| (slips, rolls));
-            csv.serialize((state, lobe, loaded, slips, rolls)).map_err(csv_error)?;
+        csv.write_record(columns.iter().map(|(name, _)| name)).map_err(csv_error)?;
+        let mut row = Vec::with_capacity(columns.len());
+        for state in 0..self.states.tooth.len() {
+            row.clear();
+            row.extend(columns.iter().map(|(_, column)| column.entry(state)));
+            csv.serialize(&row).map_err(csv_error)?;
         }
         csv.flush()
     }
@@ -640,7 +538,7 @@ impl SweepAnswer {
             let limit = if capacity.turns_past_teeth {
                 "beyond it the wave generator turns past its teeth".to_owned()
             } else {
-                format!("limited by {}", word(&capacity.limited_by))
+                format!("limited by {}", word(&capacity.contact))
             };
             writeln!(
                 writer,
@@ -668,13 +566,13 @@ impl SweepAnswer {
             }
         }
         if let Some(losses) = &self.losses {
-            losses.totals.write_text(writer)?;
+            losses::write_text(&losses.totals, writer)?;
         }
         if let Some(radial_force) = &self.radial_force_n {
             let most_n = radial_force.value.iter().copied().fold(0.0, f64::max);
             writeln!(writer, "\nlargest force on the wave generator {most_n:.6} N, across its axis")?;
         }
-        self.model_error.write_text(writer)?;
+        model_error::write_text(&self.model_error, writer)?;
         backing::write_text(&self.series_compliance_estimates, writer)?;
         write_findings(&self.findings, writer)
     }

@@ -6,12 +6,14 @@ use std::f64::consts::PI;
 use crate::contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
 use crate::drive::{Draft, Drive, ToothShape};
 use crate::gaps::MM_PER_UM;
-use crate::load_sharing::LoadCase;
+use crate::load_sharing::{LoadCase, LoadParameters};
 use crate::parts::{CarrierPart, PartsParameters, RIM};
 use crate::sweep::ContactPeaks;
 
 /// What joins the fingers between the carrier's slots beside the teeth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
 pub enum Fingers {
     /// A disc at one end.
     HeldAtOneEnd,
@@ -21,6 +23,8 @@ pub enum Fingers {
 
 /// What stands around the ring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
 pub enum Rim {
     /// A rigid housing.
     Housed,
@@ -39,6 +43,7 @@ pub struct Support {
 
 /// What gives way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum Backing {
     /// The wave generator between its contacts and its bore.
     CamOnBore,
@@ -258,8 +263,7 @@ impl Backings {
     }
 
     /// The estimates; what a body gives way within the depth that its law counts to stands in the law.
-    pub fn estimates(&self, drive: &Drive, load: &LoadCase) -> Vec<Estimate> {
-        let p = load.parameters();
+    pub fn estimates(&self, drive: &Drive, p: &LoadParameters) -> Vec<Estimate> {
         let counted_mm = |contact| counted_depth_mm(drive, &p.law, contact);
         let held = |strip: Option<HeldStrip>, contact: Contact| {
             strip.map(|strip| strip.compliance_mm_per_n(p.materials.partner(contact), counted_mm(contact)).max(0.0))
@@ -278,6 +282,16 @@ impl Backings {
         .filter_map(|(backing, compliance)| Some((backing, compliance.filter(|compliance| compliance.is_finite())?)))
         .map(|(backing, compliance_mm_per_n)| Estimate { backing, compliance_mm_per_n })
         .collect()
+    }
+
+    /// The estimates of the parts as they are held, as series compliance; nothing where there is none.
+    pub fn series_compliance_mm_per_n(&self, drive: &Drive, p: &LoadParameters) -> PerContact<f64> {
+        let estimates = self.estimates(drive, p);
+        PerContact::of(|contact| {
+            let is_held =
+                |&&Estimate { backing, .. }: &&Estimate| backing.contact() == contact && backing.is_of(&self.support);
+            estimates.iter().find(is_held).map_or(0.0, |estimate| estimate.compliance_mm_per_n)
+        })
     }
 }
 
@@ -320,7 +334,7 @@ impl Shares {
             return None;
         }
         let shares = backings
-            .estimates(drive, load)
+            .estimates(drive, p)
             .into_iter()
             .filter(|estimate| {
                 let is_given = *p.series_compliance_mm_per_n.get(estimate.backing.contact()) > 0.0;

@@ -17,6 +17,7 @@ pub enum Part {
 
 /// A contact of a tooth with another part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum Contact {
     /// With the wave generator.
     WaveGenerator,
@@ -48,6 +49,7 @@ impl Contact {
 
 /// One value for each contact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct PerContact<T> {
     /// At the wave generator.
     pub wave_generator: T,
@@ -180,6 +182,35 @@ pub enum ContactLaw {
     },
     /// Hertz's `δ = q F^(2/3)` of a point contact: the law of balls.
     Hertz,
+}
+
+/// A contact law by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
+pub enum LawName {
+    /// `k = π L1 E*/2`.
+    Linear,
+    /// Given stiffnesses.
+    Fixed,
+    /// Palmgren's.
+    Palmgren,
+    /// Johnson's.
+    Johnson,
+    /// Hertz's.
+    Hertz,
+}
+
+impl ContactLaw {
+    /// Its name.
+    pub const fn name(&self) -> LawName {
+        match self {
+            Self::Linear => LawName::Linear,
+            Self::Fixed(_) => LawName::Fixed,
+            Self::Palmgren => LawName::Palmgren,
+            Self::Johnson { .. } => LawName::Johnson,
+            Self::Hertz => LawName::Hertz,
+        }
+    }
 }
 
 /// Hertz stress of a line contact \[8\]: `σ = √(F/(π L1) · (1/ρ1 + 1/ρ2) · E*)`.

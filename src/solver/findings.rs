@@ -16,6 +16,8 @@ use crate::sweep::{ContactPeaks, States, Sweep};
 use crate::tooth::line::{WIDE_SHARE, least_length_mm};
 use crate::tooth::plain_approach_mm;
 
+use FindingCode as Code;
+
 /// Contact stress at the fatigue limit of bearing steel (ISO 281:2007).
 pub const FATIGUE_LIMIT_STRESS_MPA: f64 = 1500.0;
 
@@ -56,240 +58,112 @@ pub const GROOVE_DEPTH_SHARE_OF_BALL: f64 = 0.5;
 
 const STEEL: Material = Material::STEEL;
 
-/// The edge of the carrier's annulus that a tooth passes.
+/// How grave a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Edge {
-    /// Towards the wave generator.
-    Inner,
-    /// Towards the ring.
-    Outer,
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
+pub enum Severity {
+    /// Good to know.
+    Info,
+    /// Likely to trouble the drive.
+    Warning,
 }
 
-/// A wall that the parts as they are made leave.
+/// Kinds of finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wall {
-    /// Between the ring's tooth spaces and its outer circle.
-    RingRim,
-    /// Between the cam and its bore.
-    Cam,
-}
-
-/// Something questionable about a drive or its load.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Finding {
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
+pub enum FindingCode {
     /// The ring's tips are cut away by their own envelope.
-    Undercut {
-        /// `r`.
-        tooth_radius_mm: f64,
-        /// The least radius that undercuts.
-        critical_tooth_radius_mm: f64,
-        /// Where teeth then start to touch the flank.
-        engagement_start_deg: f64,
-        /// Whether a bore takes more away than undercut does.
-        is_bored_away: bool,
-    },
-    /// The bore ends the flank before its natural tip: teeth enter under load.
-    BoreShortensFlank {
-        /// The bore.
-        tip_radius_mm: f64,
-        /// The tip without it.
-        natural_tip_radius_mm: f64,
-        /// Where teeth then start to touch the flank.
-        engagement_start_deg: f64,
-    },
+    Undercut,
+    /// The bore ends the flank before its natural tip.
+    BoreShortensFlank,
     /// The bore lies inside the natural tip.
-    BoreWithoutEffect {
-        /// The bore.
-        tip_radius_mm: f64,
-        /// The tip without it.
-        natural_tip_radius_mm: f64,
-    },
+    BoreWithoutEffect,
     /// At some input angle fewer than two teeth of a zone mesh.
-    FewTeethInMesh {
-        /// How many.
-        min: u64,
-    },
+    FewTeethInMesh,
     /// The wall between two slots is thin.
-    ThinSlotWall {
-        /// Its least thickness.
-        slot_wall_mm: f64,
-        /// What it is measured against.
-        limit_mm: f64,
-    },
-    /// A loaded tooth's centre leaves the annulus between wave generator and ring tips: it presses on a slot's edge.
-    ToothBeyondCarrier {
-        /// Which edge it passes.
-        edge: Edge,
-        /// How far its centre goes.
-        center_radius_mm: f64,
-        /// The edge of the annulus.
-        limit_mm: f64,
-    },
-    /// The flank stands steep to the radius.
-    SteepRingFlank {
-        /// Largest pressure angle β on the engaged flank.
-        pressure_angle_deg: f64,
-    },
-    /// The cam is hollow in its valleys: a solid one turns, but the ring of a bearing could not follow it.
-    HollowWaveGenerator {
-        /// `e`.
-        amplitude_mm: f64,
-        /// The largest that leaves the cam convex, `R/(U² + 1)`.
-        limit_mm: f64,
-    },
-    /// The flats of the teeth end their arcs before the steepest contact with the ring.
-    FlatCutsTheContact {
-        /// `l`.
-        flat_length_mm: f64,
-        /// The longest flat that leaves the contact whole, `2r cos β`.
-        limit_mm: f64,
-    },
-    /// A ball's contact, where its stress peaks, is longer than its groove is wide.
-    ContactBeyondGroove {
-        /// Where.
-        contact: Contact,
-        /// Half the contact's length along the axis.
-        half_length_mm: f64,
-        /// Half the groove's width at its edges.
-        limit_mm: f64,
-    },
-    /// A groove that balls run in is not drawn: the outline is that in the middle of the width.
-    GrooveNotDrawn {
-        /// Where.
-        contact: Contact,
-        /// `r_g`.
-        groove_radius_mm: f64,
-        /// `r`.
-        ball_radius_mm: f64,
-    },
-    /// The linear law where approaches matter: it is several times too stiff.
-    LinearLawTooStiff {
-        /// The approach at the wave generator under the peak force by the linear law.
-        linear_um: f64,
-        /// The same by Palmgren's law.
-        palmgren_um: f64,
-    },
+    ThinSlotWall,
+    /// A loaded tooth's centre leaves the carrier's annulus.
+    ToothBeyondCarrier,
+    /// The ring's flank stands steep to the radius.
+    SteepRingFlank,
+    /// The linear law where wind-up or clearance was asked for: it is several times too stiff.
+    LinearLawTooStiff,
+    /// A cam with hollow valleys, which no bearing's ring could follow.
+    HollowWaveGenerator,
+    /// The teeth's flats end their arcs before the steepest contact.
+    FlatCutsTheContact,
+    /// A ball's contact is longer than its groove is wide.
+    ContactBeyondGroove,
+    /// A groove that balls run in is not drawn.
+    GrooveNotDrawn,
     /// `projection` where the ring's flank is steep: forces come out too large.
-    ProjectionOnSteepFlank {
-        /// Largest pressure angle β on the engaged flank.
-        pressure_angle_deg: f64,
-    },
-    /// `projection` with a gap, which it weighs by less than the work done there.
-    ProjectionWithGap {
-        /// The largest gap of a contact.
-        gap_um: f64,
-    },
-    /// The carrier's fingers give way by more than the model, which takes them as rigid, can leave out.
-    SlenderFingers {
-        /// What they add to a tooth's approach at its contacts, over that.
-        share: f64,
-        /// Whether they are held at one end; otherwise at both, or nothing is said.
-        is_held_at_one_end: bool,
-    },
+    ProjectionOnSteepFlank,
+    /// `projection` with a gap, which it does not weigh by the work done.
+    ProjectionWithGap,
+    /// The carrier's fingers give way by more than can be left out.
+    SlenderFingers,
     /// The ring's rim does so.
-    SoftRim {
-        /// What it adds to a tooth's approach at its contacts, over that.
-        share: f64,
-        /// Whether nothing stands around it; otherwise it is housed, or nothing is said.
-        is_free: bool,
-    },
+    SoftRim,
     /// Palmgren's law for a contact that is not steel on steel.
-    PalmgrenBeyondSteel {
-        /// Which.
-        contact: Contact,
-        /// Its contact modulus.
-        contact_modulus_gpa: f64,
-        /// That of steel on steel.
-        steel_gpa: f64,
-    },
+    PalmgrenBeyondSteel,
     /// Johnson's law for a contact that is wide beside the tooth's radius or the depth.
-    JohnsonBeyondHalfWidth {
-        /// Which.
-        contact: Contact,
-        /// Half of its largest width.
-        half_width_mm: f64,
-        /// What it should stay below.
-        limit_mm: f64,
-    },
+    JohnsonBeyondHalfWidth,
     /// A wind-up so large that the teeth no longer stand where the model has them.
-    WindUpBeyondModel {
-        /// The largest wind-up of the input.
-        wind_up_deg: f64,
-        /// What it is measured against.
-        limit_deg: f64,
-        /// Whether the wave generator moves on under its teeth.
-        is_moving: bool,
-    },
+    WindUpBeyondModel,
     /// A tooth's centre passes the end of its slot's walls, as the carrier is made.
-    ToothLeavesSlot {
-        /// Which end it passes.
-        edge: Edge,
-        /// How far its centre goes.
-        center_radius_mm: f64,
-        /// Where the slot's walls end, along the slot from the axis.
-        wall_end_mm: f64,
-        /// Whether it does so while it touches the ring's flank.
-        is_loaded: bool,
-    },
+    ToothLeavesSlot,
     /// A wall of a part as it is made is thin.
-    ThinWallAsMade {
-        /// Which.
-        wall: Wall,
-        /// Its least thickness.
-        wall_mm: f64,
-        /// What it is measured against.
-        limit_mm: f64,
-    },
-    /// The ring's flank is undercut only because it is set back.
-    ClearanceUndercutsRing {
-        /// Whether by a clearance.
-        has_clearance: bool,
-        /// Whether by an equidistant modification.
-        is_set_back: bool,
-        /// The flank's distance from the path of the teeth's centres: `r`, the clearance and the modification.
-        distance_mm: f64,
-        /// The least one that undercuts.
-        critical_distance_mm: f64,
-    },
+    ThinWallAsMade,
+    /// The ring's flank is undercut only because its clearance sets it back.
+    ClearanceUndercutsRing,
     /// Friction beyond the range in which first order was held against exact equilibria.
-    FrictionBeyondMeasured {
-        /// Whether it is that along the wave generator as a whole.
-        is_along_cam: bool,
-        /// The coefficient.
-        coefficient: f64,
-        /// The end of the range.
-        limit: f64,
-    },
+    FrictionBeyondMeasured,
     /// Friction so large that an exact equilibrium may have quite another efficiency.
-    EfficiencyUncertain {
-        /// The largest error that was measured at such a loss and such coefficients.
-        error: f64,
-        /// What it is measured against.
-        limit: f64,
-    },
+    EfficiencyUncertain,
     /// A load on the wave generator's bearing beyond which the equation of its life does not hold.
-    BearingLoadAboveHalfRating {
-        /// The mean load, of a duty that of the point where it is largest.
-        load_n: f64,
-        /// What it is measured against.
-        limit_n: f64,
-    },
+    BearingLoadAboveHalfRating,
     /// A stress above the one that the contact may have.
-    StressAboveAllowable {
-        /// Where.
-        contact: Contact,
-        /// The peak.
-        stress_mpa: f64,
-        /// What it may be.
-        allowable_mpa: f64,
-    },
+    StressAboveAllowable,
     /// A stress above the fatigue limit of bearing steel.
-    StressAboveFatigueLimit {
-        /// Where.
-        contact: Contact,
-        /// The peak.
-        stress_mpa: f64,
-    },
+    StressAboveFatigueLimit,
+    /// A field that a later version will not know.
+    DeprecatedField,
+    /// A surface that a clearance and a modification set back.
+    SetBackTwice,
+}
+
+/// Something questionable about a drive, its load or its document.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finding {
+    /// The kind of finding.
+    pub code: FindingCode,
+    /// How grave it is.
+    pub severity: Severity,
+    /// What was found.
+    pub value: f64,
+    /// What it is measured against.
+    pub limit: f64,
+    /// The contact, or the part that teeth touch there, if it is about one.
+    pub contact: Option<Contact>,
+}
+
+impl Finding {
+    const fn warning(code: FindingCode, value: f64, limit: f64) -> Self {
+        Self { code, severity: Severity::Warning, value, limit, contact: None }
+    }
+
+    const fn info(code: FindingCode, value: f64, limit: f64) -> Self {
+        Self { severity: Severity::Info, ..Self::warning(code, value, limit) }
+    }
+
+    const fn at(self, contact: Contact) -> Self {
+        Self { contact: Some(contact), ..self }
+    }
+
+    /// A warning in this case, otherwise information.
+    const fn grave_if(code: FindingCode, value: f64, limit: f64, is_grave: bool) -> Self {
+        if is_grave { Self::warning(code, value, limit) } else { Self::info(code, value, limit) }
+    }
 }
 
 /// The findings about the drive itself.
@@ -301,66 +175,54 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
     let p = drive.parameters();
     let flank = drive.flank();
     let limit = drive.flank_limit();
-    let engagement_start_deg = limit.position.from_lobe_deg();
     let natural_tip_radius_mm = drive.natural_tip_radius_mm();
     if flank.is_undercut()
         && let Some(critical_tooth_radius_mm) = flank.critical_tooth_radius_mm()
     {
-        findings.push(Finding::Undercut {
-            tooth_radius_mm: p.tooth_radius_mm,
-            critical_tooth_radius_mm,
-            engagement_start_deg,
-            is_bored_away: limit.end == FlankEnd::Bore,
-        });
+        let is_grave = limit.end != FlankEnd::Bore;
+        findings.push(Finding::grave_if(Code::Undercut, p.tooth_radius_mm, critical_tooth_radius_mm, is_grave));
     }
     match p.tip_radius_mm {
         Some(tip_radius_mm) if limit.end == FlankEnd::Bore => {
-            findings.push(Finding::BoreShortensFlank { tip_radius_mm, natural_tip_radius_mm, engagement_start_deg });
+            findings.push(Finding::info(Code::BoreShortensFlank, tip_radius_mm, natural_tip_radius_mm));
         }
         Some(tip_radius_mm) if tip_radius_mm < natural_tip_radius_mm => {
-            findings.push(Finding::BoreWithoutEffect { tip_radius_mm, natural_tip_radius_mm });
+            findings.push(Finding::info(Code::BoreWithoutEffect, tip_radius_mm, natural_tip_radius_mm));
         }
         Some(_) | None => {}
     }
     let min = Mesh::new(drive).teeth_in_mesh().min;
     if min < 2 {
-        findings.push(Finding::FewTeethInMesh { min });
+        #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
+        findings.push(Finding::warning(Code::FewTeethInMesh, min as f64, 2.0));
     }
     let slot_wall_mm = drive.slot_wall_mm();
     let limit_mm = THIN_WALL_SHARE_OF_SLOT * 2.0 * drive.slot_half_width_mm();
     if slot_wall_mm < limit_mm {
-        findings.push(Finding::ThinSlotWall { slot_wall_mm, limit_mm });
+        findings.push(Finding::warning(Code::ThinSlotWall, slot_wall_mm, limit_mm));
     }
     let innermost_mm = flank.locus().at(limit.position)?.center_radius_mm;
     let cam_outer_mm = drive.cam_outer_radius_mm();
     if innermost_mm < cam_outer_mm {
-        findings.push(Finding::ToothBeyondCarrier {
-            edge: Edge::Inner,
-            center_radius_mm: innermost_mm,
-            limit_mm: cam_outer_mm,
-        });
+        findings.push(Finding::warning(Code::ToothBeyondCarrier, innermost_mm, cam_outer_mm));
     }
     let outermost_mm = cam_outer_mm + p.tooth_radius_mm;
     if outermost_mm > drive.tip_radius_mm() {
-        findings.push(Finding::ToothBeyondCarrier {
-            edge: Edge::Outer,
-            center_radius_mm: outermost_mm,
-            limit_mm: drive.tip_radius_mm(),
-        });
+        findings.push(Finding::warning(Code::ToothBeyondCarrier, outermost_mm, drive.tip_radius_mm()));
     }
     let tan_pressure_angle = drive.steepest_engaged()?.tan_pressure_angle * flank.teeth_per_wave();
     let pressure_angle_deg = tan_pressure_angle.atan().to_degrees();
     if pressure_angle_deg > STEEP_FLANK_DEG {
-        findings.push(Finding::SteepRingFlank { pressure_angle_deg });
+        findings.push(Finding::warning(Code::SteepRingFlank, pressure_angle_deg, STEEP_FLANK_DEG));
     }
     if let Some(Hollow { amplitude_mm, limit_mm }) = flank.locus().cam().kind().hollow() {
-        findings.push(Finding::HollowWaveGenerator { amplitude_mm, limit_mm });
+        findings.push(Finding::info(Code::HollowWaveGenerator, amplitude_mm, limit_mm));
     }
     if let ToothShape::FlatSided { flat_length_mm, .. } = p.tooth {
         // The arcs that the flats leave reach as far as the contact with the ring: w/2 ≥ r sin β, that is, l ≤ 2r cos β.
         let limit_mm = 2.0 * p.tooth_radius_mm / tan_pressure_angle.hypot(1.0);
         if flat_length_mm > limit_mm {
-            findings.push(Finding::FlatCutsTheContact { flat_length_mm, limit_mm });
+            findings.push(Finding::warning(Code::FlatCutsTheContact, flat_length_mm, limit_mm));
         }
     }
     Ok(findings)
@@ -378,11 +240,12 @@ pub fn of_projection(drive: &Drive, load: &LoadCase) -> Result<Vec<Finding>, Not
     let mut findings = Vec::new();
     let pressure_angle_deg = drive.largest_pressure_angle_deg()?;
     if pressure_angle_deg > STEEP_FOR_PROJECTION_DEG {
-        findings.push(Finding::ProjectionOnSteepFlank { pressure_angle_deg });
+        let limit_deg = STEEP_FOR_PROJECTION_DEG;
+        findings.push(Finding::info(Code::ProjectionOnSteepFlank, pressure_angle_deg, limit_deg));
     }
     let gap_um = p.clearance_um.iter().fold(0.0, |most: f64, (_, &gap_um)| most.max(gap_um));
     if gap_um > 0.0 {
-        findings.push(Finding::ProjectionWithGap { gap_um });
+        findings.push(Finding::warning(Code::ProjectionWithGap, gap_um, 0.0));
     }
     Ok(findings)
 }
@@ -390,12 +253,15 @@ pub fn of_projection(drive: &Drive, load: &LoadCase) -> Result<Vec<Finding>, Not
 /// What gives way behind the contacts by more than can be left out.
 pub fn of_backing(shares: &Shares) -> Vec<Finding> {
     let soft = shares.shares.iter().filter(|(_, share)| *share > SOFT_BACKING_SHARE);
-    let finding = |&(estimate, share): &(Estimate, f64)| match estimate.backing {
-        Backing::FingerAtOneEnd => Some(Finding::SlenderFingers { share, is_held_at_one_end: true }),
-        Backing::FingerAtBothEnds => Some(Finding::SlenderFingers { share, is_held_at_one_end: false }),
-        Backing::FreeRim => Some(Finding::SoftRim { share, is_free: true }),
-        Backing::HousedRim => Some(Finding::SoftRim { share, is_free: false }),
-        Backing::CamOnBore => None,
+    let finding = |&(estimate, share): &(Estimate, f64)| {
+        let (code, is_grave) = match estimate.backing {
+            Backing::FingerAtOneEnd => (Code::SlenderFingers, true),
+            Backing::FingerAtBothEnds => (Code::SlenderFingers, false),
+            Backing::FreeRim => (Code::SoftRim, true),
+            Backing::HousedRim => (Code::SoftRim, false),
+            Backing::CamOnBore => return None,
+        };
+        Some(Finding::grave_if(code, share, SOFT_BACKING_SHARE, is_grave))
     };
     soft.filter_map(finding).collect()
 }
@@ -409,7 +275,7 @@ pub fn of_wind_up(drive: &Drive, load: &LoadCase, sweep: &Sweep) -> Option<Findi
     } else {
         WIND_UP_SHARE_OF_PERIOD * Mesh::new(drive).period_deg()
     };
-    (wind_up_deg > limit_deg).then_some(Finding::WindUpBeyondModel { wind_up_deg, limit_deg, is_moving })
+    (wind_up_deg > limit_deg).then_some(Finding::warning(Code::WindUpBeyondModel, wind_up_deg, limit_deg))
 }
 
 /// How far first order holds for the friction of a sweep with this mean loss ratio (docs/explanation/theory.md section 10.6).
@@ -421,33 +287,31 @@ pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) 
         let is_along_cam = coefficient <= MEASURED_TO;
         let (coefficient, limit) =
             if is_along_cam { (coefficient_along_cam, MEASURED_TO_ALONG_CAM) } else { (coefficient, MEASURED_TO) };
-        return Some(Finding::FrictionBeyondMeasured { is_along_cam, coefficient, limit });
+        return Some(Finding::warning(Code::FrictionBeyondMeasured, coefficient, limit));
     }
-    (efficiency > UNCERTAIN_EFFICIENCY)
-        .then_some(Finding::EfficiencyUncertain { error: efficiency, limit: UNCERTAIN_EFFICIENCY })
+    (efficiency > UNCERTAIN_EFFICIENCY).then_some(Finding::info(
+        Code::EfficiencyUncertain,
+        efficiency,
+        UNCERTAIN_EFFICIENCY,
+    ))
 }
 
 /// That the load on a bearing of this rating goes beyond what the equation of its life holds for (docs/explanation/theory.md section 10.5).
 pub fn of_bearing(dynamic_load_rating_n: f64, load_n: f64) -> Option<Finding> {
     let limit_n = LIFE_HOLDS_TO_SHARE_OF_RATING * dynamic_load_rating_n;
-    (load_n > limit_n).then_some(Finding::BearingLoadAboveHalfRating { load_n, limit_n })
+    (load_n > limit_n).then_some(Finding::warning(Code::BearingLoadAboveHalfRating, load_n, limit_n))
 }
 
 /// The findings about the ring as it is made (docs/explanation/theory.md section 8).
 pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
     let flank = ring.space.set_back_flank();
-    let mut findings = thin_wall(drive, Wall::RingRim, ring.outer_radius_mm - ring.space.outermost_radius_mm());
-    findings.extend(groove_not_drawn(drive, Contact::Ring));
+    let thin = thin_wall(drive, Contact::Ring, ring.outer_radius_mm - ring.space.outermost_radius_mm());
+    let mut findings: Vec<_> = thin.into_iter().chain(groove_not_drawn(drive, Contact::Ring)).collect();
     if ring.space.is_undercut_by_distance()
         && !drive.flank().is_undercut()
         && let Some(critical_distance_mm) = flank.critical_distance_mm()
     {
-        findings.push(Finding::ClearanceUndercutsRing {
-            has_clearance: ring.has_clearance,
-            is_set_back: ring.is_set_back,
-            distance_mm: flank.distance_mm(),
-            critical_distance_mm,
-        });
+        findings.push(Finding::warning(Code::ClearanceUndercutsRing, flank.distance_mm(), critical_distance_mm));
     }
     findings
 }
@@ -455,7 +319,7 @@ pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
 /// The findings about the wave generator as it is made; a solid cam has no wall.
 pub(crate) fn of_wave_generator(drive: &Drive, cam: &WaveGeneratorPart) -> Vec<Finding> {
     let wall_mm = |bore_mm: f64| drive.flank().locus().cam_inner_radius_mm() - cam.set_back_mm - bore_mm;
-    let thin = cam.bore_radius_mm.map_or_else(Vec::new, |bore_mm| thin_wall(drive, Wall::Cam, wall_mm(bore_mm)));
+    let thin = cam.bore_radius_mm.and_then(|bore_mm| thin_wall(drive, Contact::WaveGenerator, wall_mm(bore_mm)));
     thin.into_iter().chain(groove_not_drawn(drive, Contact::WaveGenerator)).collect()
 }
 
@@ -480,20 +344,10 @@ pub(crate) fn of_carrier(drive: &Drive, carrier: &CarrierPart) -> Result<Vec<Fin
     if innermost_mm < inner_mm {
         let is_loaded = innermost_loaded_mm < inner_mm;
         let center_radius_mm = if is_loaded { innermost_loaded_mm } else { innermost_mm };
-        findings.push(Finding::ToothLeavesSlot {
-            edge: Edge::Inner,
-            center_radius_mm,
-            wall_end_mm: inner_mm,
-            is_loaded,
-        });
+        findings.push(Finding::grave_if(Code::ToothLeavesSlot, center_radius_mm, inner_mm, is_loaded));
     }
     if outermost_mm > outer_mm {
-        findings.push(Finding::ToothLeavesSlot {
-            edge: Edge::Outer,
-            center_radius_mm: outermost_mm,
-            wall_end_mm: outer_mm,
-            is_loaded: true,
-        });
+        findings.push(Finding::warning(Code::ToothLeavesSlot, outermost_mm, outer_mm));
     }
     findings.extend(groove_not_drawn(drive, Contact::Carrier));
     Ok(findings)
@@ -510,7 +364,7 @@ const fn groove_radius_mm(drive: &Drive, contact: Contact) -> Option<f64> {
 /// The finding, where there is a groove: outlines are drawn without it.
 fn groove_not_drawn(drive: &Drive, contact: Contact) -> Option<Finding> {
     let ball_radius_mm = drive.parameters().tooth_radius_mm;
-    let finding = |groove_radius_mm| Finding::GrooveNotDrawn { contact, groove_radius_mm, ball_radius_mm };
+    let finding = |groove_radius_mm| Finding::info(Code::GrooveNotDrawn, groove_radius_mm, ball_radius_mm).at(contact);
     groove_radius_mm(drive, contact).map(finding)
 }
 
@@ -521,9 +375,9 @@ fn groove_half_width_mm(groove_radius_mm: f64, ball_radius_mm: f64) -> f64 {
 }
 
 /// The finding, where a wall is thinner than the share of a slot's width that a wall between slots should have too.
-fn thin_wall(drive: &Drive, wall: Wall, wall_mm: f64) -> Vec<Finding> {
+fn thin_wall(drive: &Drive, contact: Contact, wall_mm: f64) -> Option<Finding> {
     let limit_mm = THIN_WALL_SHARE_OF_SLOT * 2.0 * drive.slot_half_width_mm();
-    if wall_mm < limit_mm { vec![Finding::ThinWallAsMade { wall, wall_mm, limit_mm }] } else { Vec::new() }
+    (wall_mm < limit_mm).then_some(Finding::warning(Code::ThinWallAsMade, wall_mm, limit_mm).at(contact))
 }
 
 /// Whether a contact is that of a flat.
@@ -547,7 +401,7 @@ pub fn of_contacts(
         && approaches_matter
         && let Some((linear_mm, palmgren_mm)) = approach_mm(ContactLaw::Linear).zip(approach_mm(ContactLaw::Palmgren))
     {
-        findings.push(Finding::LinearLawTooStiff { linear_um: 1e3 * linear_mm, palmgren_um: 1e3 * palmgren_mm });
+        findings.push(Finding::info(Code::LinearLawTooStiff, 1e3 * linear_mm, 1e3 * palmgren_mm));
     }
     if p.law == ContactLaw::Palmgren {
         let steel = Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL };
@@ -556,11 +410,8 @@ pub fn of_contacts(
         for (contact, _) in peaks.iter().filter(|&(contact, _)| !is_flat(drive, contact)) {
             let contact_mpa = p.materials.contact_modulus_mpa(contact);
             if (contact_mpa / steel_mpa - 1.0).abs() > STEEL_TOLERANCE {
-                findings.push(Finding::PalmgrenBeyondSteel {
-                    contact,
-                    contact_modulus_gpa: 1e-3 * contact_mpa,
-                    steel_gpa: 1e-3 * steel_mpa,
-                });
+                let (contact_gpa, steel_gpa) = (1e-3 * contact_mpa, 1e-3 * steel_mpa);
+                findings.push(Finding::warning(Code::PalmgrenBeyondSteel, contact_gpa, steel_gpa).at(contact));
             }
         }
     }
@@ -570,7 +421,7 @@ pub fn of_contacts(
         {
             let limit_mm = groove_half_width_mm(groove_radius_mm, drive.parameters().tooth_radius_mm);
             if half_length_mm > limit_mm {
-                findings.push(Finding::ContactBeyondGroove { contact, half_length_mm, limit_mm });
+                findings.push(Finding::warning(Code::ContactBeyondGroove, half_length_mm, limit_mm).at(contact));
             }
         }
     }
@@ -583,18 +434,16 @@ pub fn of_contacts(
                 .filter(|(_, stress_mpa, allowable_mpa)| {
                     stress_mpa > allowable_mpa && allowable_mpa.total_cmp(&FATIGUE_LIMIT_STRESS_MPA).is_ne()
                 })
-                .map(|(contact, stress_mpa, allowable_mpa)| Finding::StressAboveAllowable {
-                    contact,
-                    stress_mpa,
-                    allowable_mpa,
+                .map(|(contact, stress_mpa, allowable_mpa)| {
+                    Finding::warning(Code::StressAboveAllowable, stress_mpa, allowable_mpa).at(contact)
                 }),
         );
     }
-    let stressed = peaks.iter().filter(|(_, peaks)| peaks.stress_mpa.value > FATIGUE_LIMIT_STRESS_MPA);
-    findings.extend(
-        stressed
-            .map(|(contact, peaks)| Finding::StressAboveFatigueLimit { contact, stress_mpa: peaks.stress_mpa.value }),
-    );
+    let stresses = peaks.iter().map(|(contact, peaks)| (contact, peaks.stress_mpa.value));
+    let tired = stresses.filter(|(_, stress_mpa)| *stress_mpa > FATIGUE_LIMIT_STRESS_MPA);
+    findings.extend(tired.map(|(contact, stress_mpa)| {
+        Finding::warning(Code::StressAboveFatigueLimit, stress_mpa, FATIGUE_LIMIT_STRESS_MPA).at(contact)
+    }));
     findings
 }
 
@@ -616,10 +465,8 @@ pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Fi
     widest_half_widths_mm(drive, states)
         .map(|(contact, half_width_mm)| {
             let limit_mm = WIDE_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
-            Finding::JohnsonBeyondHalfWidth { contact, half_width_mm, limit_mm }
+            Finding::warning(Code::JohnsonBeyondHalfWidth, half_width_mm, limit_mm).at(contact)
         })
-        .filter(|finding| {
-            matches!(finding, Finding::JohnsonBeyondHalfWidth { half_width_mm, limit_mm, .. } if half_width_mm > limit_mm)
-        })
+        .filter(|finding| finding.value > finding.limit)
         .collect()
 }

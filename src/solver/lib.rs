@@ -59,9 +59,9 @@ mod tooth_space;
 pub mod violation;
 
 pub use cam::WaveGenerator;
-pub use contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
+pub use contact::{Contact, ContactLaw, LawName, Material, Materials, Part, PerContact};
 pub use drive::{Drive, DriveParameters, ToothShape};
-pub use findings::Finding;
+pub use findings::{Finding, FindingCode, Severity};
 pub use gaps::{Deviations, Modification};
 pub use load_sharing::{Compatibility, LoadCase, LoadParameters, Torque};
 use mesh::Place;

@@ -18,12 +18,15 @@ use crate::tooth::{BallContact, Contacts, CornerContact, Flat, Pressure, ToothCo
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, tooth};
 
-/// Form of compatibility: relation of the three approaches of a tooth to the rotation of the wave generator.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// How the approaches at a tooth's contacts add up to the rotation of the wave generator.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
 pub enum Compatibility {
-    /// The paper's \[3\]-\[6\]: each approach projected on the direction of `F_H`.
+    /// The paper's (equations 3 to 6): each projected on the direction of the wave generator's force.
     Projection,
-    /// Virtual work: the frictionless solution for a tooth whose centre can move freely.
+    /// Virtual work: the frictionless solution for a tooth whose centre is free to move.
+    #[default]
     VirtualWork,
 }
 

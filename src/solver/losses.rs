@@ -161,6 +161,22 @@ pub struct Efficiency {
     pub back_driven: f64,
 }
 
+/// Efficiencies with the ring fixed, the torque at the driven end given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+pub struct Efficiencies<T> {
+    /// The wave generator drives the carrier.
+    pub ring_fixed: T,
+    /// The carrier drives the wave generator; at or below 0 the drive locks itself.
+    pub ring_fixed_back_driven: T,
+}
+
+impl From<Efficiency> for Efficiencies<f64> {
+    fn from(Efficiency { driven, back_driven }: Efficiency) -> Self {
+        Self { ring_fixed: driven, ring_fixed_back_driven: back_driven }
+    }
+}
+
 impl Efficiency {
     /// From the loss over the power at the driven end, `1/(1 + ℓ)` and `1 - ℓ`.
     pub fn of_loss(loss_share: f64) -> Self {
@@ -480,23 +496,6 @@ impl Turning {
     pub fn loss_ratio(&self) -> f64 {
         self.lost_nmm_per_rad() / self.input_torque_nmm
     }
-}
-
-/// `p·v = σ |v_c|` at each contact of a tooth, σ the largest Hertz pressure. Handbook limits are on the load over the projected area, which
-/// is far less: the two are never compared.
-pub fn pressure_velocity_mpa_m_per_s(
-    stress_mpa: &PerContact<f64>,
-    slip: &ToothSlip,
-    turning_rad_per_s: f64,
-) -> PerContact<f64> {
-    PerContact::of(|contact| {
-        1e-3 * turning_rad_per_s * stress_mpa.get(contact) * slip.slip_mm_per_rad.get(contact).abs()
-    })
-}
-
-/// Power in W of what is done per radian at a speed.
-pub fn power_w(work_nmm_per_rad: f64, turning_rad_per_s: f64) -> f64 {
-    1e-3 * work_nmm_per_rad * turning_rad_per_s
 }
 
 /// A quantity at an input angle.

@@ -53,13 +53,21 @@ pub struct Mesh {
     told_apart: Option<u64>,
 }
 
-/// Number of teeth in mesh over the input angle: of one zone if all are alike, otherwise of all zones.
+/// How many teeth, over the input angle: of a zone where the zones are alike, elsewhere, and given `deviations`, of all of them together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct TeethInMesh {
     /// Least number.
     pub min: u64,
     /// Largest number.
     pub max: u64,
+}
+
+impl std::fmt::Display for TeethInMesh {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { min, max } = self;
+        if min == max { write!(f, "{min}") } else { write!(f, "{min} to {max}") }
+    }
 }
 
 impl TeethInMesh {

@@ -1,8 +1,12 @@
 //! How far the model is off elastic bodies: what was measured against finite elements (docs/explanation/validation.md), and whether a drive is one of
 //! those that this speaks for.
 
+mod measured;
+
+use measured::MEASURED;
+
 use crate::backing::{Backing, Fingers, Rim, Shares, Support};
-use crate::contact::{Contact, ContactLaw, Material, PerContact};
+use crate::contact::{Contact, ContactLaw, LawName, Material, PerContact};
 use crate::drive::{Drive, ToothShape};
 use crate::findings::{SOFT_BACKING_SHARE, WIND_UP_SHARE_OF_PERIOD, WIND_UP_TIMES_LOBES_RAD, widest_half_widths_mm};
 use crate::gaps::Deviations;
@@ -51,8 +55,9 @@ pub const ALIKE: f64 = 0.1;
 /// A relative error of the model, `(model - bodies)/bodies`, from the least to the largest that was measured, rounded outward to whole
 /// hundredths.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct ErrorRange {
-    /// The least; where it is below zero the model says too little.
+    /// The least; below zero the model says too little.
     pub low: f64,
     /// The largest.
     pub high: f64,
@@ -83,28 +88,50 @@ pub struct Case {
     pub has_pointed_tips: bool,
 }
 
+/// A model, and what makes drives err alike under it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+pub struct MeasuredCase {
+    /// The form of compatibility.
+    pub compatibility: Compatibility,
+    /// The contact law.
+    pub law: LawName,
+    /// Whether the ring's teeth bend.
+    pub ring_teeth_bend: bool,
+    /// Whether the wave generator moves on under its teeth.
+    pub wave_generator_moves: bool,
+    /// Whether teeth are pressed against the corners of pointed or bored tips.
+    pub corner_contact: bool,
+    /// Whether any contact has a gap.
+    pub has_gaps: bool,
+    /// Whether the ring's tips are pointed or bored, so that teeth enter under load.
+    pub has_pointed_tips: bool,
+}
+
 /// What was measured of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct Measured {
-    /// Which.
-    pub case: Case,
-    /// Of the largest force of a contact.
+    /// Which case.
+    pub case: MeasuredCase,
+    /// Of the largest forces of the contacts.
     pub force: ErrorRange,
-    /// Of the stress under it.
+    /// Of the stresses under them.
     pub stress: ErrorRange,
-    /// Of the wind-up where the bodies are held at the depth that the law is given.
+    /// Of the wind-up, bodies being held at the law's depth; what gives way behind them, rim or fingers, comes on top.
     pub wind_up: ErrorRange,
 }
 
 /// Why a drive is none of those that the measured errors speak for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum Beyond {
     /// Stiffnesses of the designer's own, or balls: nothing was measured. Of other laws than Johnson's three drives were, each under one load, and with any
     /// other size or load they err otherwise: their approach grows with another power of the force, or knows no radius, modulus or backing.
     Law,
     /// Teeth that are no cylinders.
     ToothShape,
-    /// More lobes than two.
+    /// More lobes.
     Lobes,
     /// A ring with more teeth than the carrier.
     RingWithMoreTeeth,
@@ -131,8 +158,9 @@ pub enum Beyond {
 
 /// How parts are held that the law takes as held at its depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum HeldCase {
-    /// A rim in a housing, fingers at both ends; also where nothing is said.
+    /// A rim in a housing, fingers at both ends; also where `parts` says nothing.
     Housed,
     /// Fingers that are slender though held at both ends.
     SlenderFingers,
@@ -142,14 +170,16 @@ pub enum HeldCase {
     FreeRim,
 }
 
-/// How far the wind-up is off for what gives way behind the contacts and is not given as series compliance.
+/// How far the wind-up is off for parts that are not held at the law's depth, unless they are given as series compliance.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct Held {
-    /// The case.
+    /// How they are held, after `parts`.
     pub case: HeldCase,
-    /// What earlier calculations of elastic bodies found in such a case, where there were any.
+    /// What earlier calculations of elastic bodies held so found; left out where there were none.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub wind_up: Option<ErrorRange>,
-    /// What the estimates of the parts come to.
+    /// What the estimates of this design's own parts come to, of that part of the wind-up which the load adds to what gaps leave.
     pub estimated_wind_up: f64,
 }
 
@@ -179,18 +209,23 @@ impl Held {
     }
 }
 
-/// How far drives of this size and shape may go to be like those that were calculated.
+/// How far the drives went that were calculated: cylinders of steel in a ring with fewer teeth.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
-    /// The largest gap of a contact.
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+pub struct MeasuredRange {
+    /// Most lobes.
+    pub lobes: u32,
+    /// Largest pressure angle of the ring's flank.
+    pub pressure_angle_deg: f64,
+    /// Largest gap of a contact, for teeth of this size.
     pub gap_um: f64,
-    /// The largest wind-up.
+    /// Largest wind-up, for so many lobes and teeth, such tips, and gaps or none.
     pub wind_up_deg: f64,
-    /// The largest half-width of a contact over the tooth's radius.
+    /// Half of the largest width of a contact, over the tooth's radius; less where the law's own limit comes before.
     pub half_width_over_tooth_radius: f64,
 }
 
-impl Range {
+impl MeasuredRange {
     fn of(drive: &Drive, law: &ContactLaw, case: Case) -> Self {
         let tooth_radius_mm = drive.parameters().tooth_radius_mm;
         let to = match (case.has_gaps, case.has_pointed_tips) {
@@ -207,6 +242,8 @@ impl Range {
             _ => PerContact::of(|_| f64::INFINITY),
         };
         Self {
+            lobes: LOBES_TO,
+            pressure_angle_deg: PRESSURE_ANGLE_TO_DEG,
             gap_um: GAP_TO_UM.min(1e3 * GAP_SHARE_TO * tooth_radius_mm),
             wind_up_deg: by_lobes_deg.min(to.share_of_period * Mesh::new(drive).period_deg()),
             half_width_over_tooth_radius: of_law
@@ -216,92 +253,69 @@ impl Range {
     }
 }
 
-/// What is expected of the model for a drive under a load.
+/// The expected error of the model, numerical ones apart: how far it was off elastic bodies, calculated by finite elements, in drives
+/// of the same case (docs/validation.md).
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct ModelError {
-    /// What was measured of the case that is nearest, where there is one.
+    /// The errors of the case; left out where nothing was measured of the law.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub measured: Option<Measured>,
-    /// What comes on top of the wind-up's error, where that can be told.
+    /// What comes on top of the wind-up's error for what gives way behind the contacts, of cylinders under `virtual_work` with `johnson`.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub held: Option<Held>,
-    /// How far it goes for such a drive.
-    pub range: Range,
-    /// Why the drive is beyond it; empty where it lies within.
+    /// The range of the drives that were calculated.
+    pub range: MeasuredRange,
+    /// Whether this design lies within.
+    pub is_within: bool,
+    /// Why it does not.
     pub beyond: Vec<Beyond>,
 }
 
-/// What was measured of a form of compatibility with a law, the ring's teeth standing or bending; nothing of laws that were not held against finite elements.
-pub fn measured(load: &LoadParameters, case: Case) -> Option<Measured> {
-    use Compatibility::{Projection, VirtualWork};
-    // Force, stress and wind-up, in per cent, for natural tips without and with gaps, then for pointed ones. With a gap at pointed tips an
-    // earlier calculation of case 5.2, at another angle, went further in two forces: to 9 and to 53.
-    let refined = (load.ring_teeth_bend, load.wave_generator_moves);
-    if load.corner_contact && case.has_pointed_tips {
-        // Teeth at the tips themselves, and what is refined there by default.
-        let is_refined = load.ring_teeth_bend && (load.wave_generator_moves || !case.has_gaps);
-        let is_measured = matches!(load.law, ContactLaw::Johnson { .. }) && is_refined;
-        let of_case = if case.has_gaps { [(-2, 0), (-3, 1), (0, 1)] } else { [(-4, 0), (-4, 1), (-3, 1)] };
-        let [force, stress, wind_up] = of_case.map(|(low, high)| ErrorRange::percent(low, high));
-        return is_measured.then_some(Measured { case, force, stress, wind_up });
-    }
-    let [natural, natural_gaps, pointed, pointed_gaps] = match (load.compatibility, &load.law) {
-        (VirtualWork, ContactLaw::Johnson { .. }) if refined == (true, true) => [
-            [(-1, 0), (-2, 1), (-1, 1)],
-            [(-1, 1), (-5, 2), (-1, 1)],
-            [(-1, 1), (-1, 1), (0, 1)],
-            [(-1, 1), (-4, 1), (0, 1)],
-        ],
-        (VirtualWork, ContactLaw::Johnson { .. }) if refined == (true, false) => [
-            [(-1, 0), (-2, 1), (-1, 1)],
-            [(-1, 1), (-5, 2), (-1, 1)],
-            [(-1, 0), (-2, 1), (0, 1)],
-            [(-4, 0), (-4, 1), (-1, 1)],
-        ],
-        (VirtualWork, ContactLaw::Johnson { .. }) if refined == (false, true) => [
-            [(-1, 1), (-2, 1), (-2, -1)],
-            [(-1, 1), (-5, 2), (-1, 0)],
-            [(-3, 8), (-2, 4), (-6, -3)],
-            [(-3, 8), (-5, 4), (-2, 0)],
-        ],
-        _ if refined != (false, false) => return None,
-        (VirtualWork, ContactLaw::Johnson { .. }) => [
-            [(-1, 0), (-2, 1), (-2, -1)],
-            [(-1, 1), (-5, 3), (-1, 0)],
-            [(-3, 7), (-3, 4), (-6, -3)],
-            [(-3, 9), (-5, 3), (-3, 0)],
-        ],
-        (VirtualWork, ContactLaw::Palmgren) => [
-            [(-1, 1), (-2, 1), (13, 16)],
-            [(-4, 1), (-5, 1), (4, 10)],
-            [(-2, 9), (-2, 4), (14, 16)],
-            [(-3, 8), (-5, 3), (1, 5)],
-        ],
-        (VirtualWork, ContactLaw::Linear) => [
-            [(-3, -1), (-3, 0), (-81, -80)],
-            [(-3, 45), (-6, 22), (-47, -26)],
-            [(-3, 7), (-3, 4), (-83, -82)],
-            [(-3, 53), (-5, 23), (-21, -18)],
-        ],
-        (Projection, ContactLaw::Palmgren) => [
-            [(3, 11), (0, 6), (-18, 2)],
-            [(3, 17), (-3, 9), (-39, -8)],
-            [(15, 29), (0, 14), (-38, -35)],
-            [(15, 39), (-13, 18), (-84, -47)],
-        ],
-        (Projection, ContactLaw::Linear) => [
-            [(1, 8), (-1, 5), (-87, -82)],
-            [(1, 77), (-4, 34), (-88, -39)],
-            [(13, 26), (-1, 12), (-91, -89)],
-            [(12, 110), (-12, 45), (-96, -61)],
-        ],
-        (Projection, ContactLaw::Johnson { .. }) | (_, ContactLaw::Fixed(_) | ContactLaw::Hertz) => return None,
+/// Errors that were found of a case, in per cent.
+struct Row {
+    case: MeasuredCase,
+    /// Of force, stress and wind-up.
+    percent: [[i32; 2]; 3],
+}
+
+/// Its flags: the ring's teeth bend, the wave generator moves, corners are met; tips are pointed, contacts have gaps.
+const fn row(
+    compatibility: Compatibility,
+    law: LawName,
+    [ring_teeth_bend, wave_generator_moves, corner_contact]: [bool; 3],
+    [has_pointed_tips, has_gaps]: [bool; 2],
+    percent: [[i32; 2]; 3],
+) -> Row {
+    let case = MeasuredCase {
+        compatibility,
+        law,
+        ring_teeth_bend,
+        wave_generator_moves,
+        corner_contact,
+        has_gaps,
+        has_pointed_tips,
     };
-    let of_case = match (case.has_pointed_tips, case.has_gaps) {
-        (false, false) => natural,
-        (false, true) => natural_gaps,
-        (true, false) => pointed,
-        (true, true) => pointed_gaps,
+    Row { case, percent }
+}
+
+/// What was measured of a model in such a case; nothing of a model that was not held against finite elements.
+pub fn measured(load: &LoadParameters, Case { has_gaps, has_pointed_tips }: Case) -> Option<Measured> {
+    let LoadParameters { compatibility, law, ring_teeth_bend, wave_generator_moves, corner_contact, .. } = *load;
+    let law = law.name();
+    let case = MeasuredCase {
+        compatibility,
+        law,
+        ring_teeth_bend,
+        wave_generator_moves,
+        corner_contact,
+        has_gaps,
+        has_pointed_tips,
     };
-    let [force, stress, wind_up] = of_case.map(|(low, high)| ErrorRange::percent(low, high));
+    // Corners are met at pointed tips alone.
+    let wanted = MeasuredCase { corner_contact: corner_contact && has_pointed_tips, ..case };
+    let [force, stress, wind_up] =
+        MEASURED.iter().find(|row| row.case == wanted)?.percent.map(|[low, high]| ErrorRange::percent(low, high));
     Some(Measured { case, force, stress, wind_up })
 }
 
@@ -334,7 +348,7 @@ pub fn of(
         |material: &Material| (material.compliance_per_mpa() / own.compliance_per_mpa() - 1.0).abs() <= ALIKE;
     let mates = [&p.materials.wave_generator, &p.materials.ring, &p.materials.carrier];
     let tooth_radius_mm = drive.parameters().tooth_radius_mm;
-    let range = Range::of(drive, &p.law, case);
+    let range = MeasuredRange::of(drive, &p.law, case);
     // Slots that run into each other leave no finger that could be estimated.
     let has_estimate = |shares: &Shares, contact: Contact| {
         *p.series_compliance_mm_per_n.get(contact) > 0.0
@@ -365,7 +379,7 @@ pub fn of(
         (parts.is_some_and(|(_, shares)| is_soft(shares)), Beyond::SoftBacking),
         (widest_mm > range.half_width_over_tooth_radius * tooth_radius_mm, Beyond::HalfWidth),
     ];
-    let beyond = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
+    let beyond: Vec<_> = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
     let held = parts.and_then(|(support, shares)| Held::of(support, shares));
-    Ok(ModelError { measured, held, range, beyond })
+    Ok(ModelError { measured, held, range, is_within: beyond.is_empty(), beyond })
 }

@@ -240,9 +240,6 @@ impl Annulus {
 pub struct RingPart {
     pub(crate) space: ToothSpace,
     pub(crate) outer_radius_mm: f64,
-    pub(crate) has_clearance: bool,
-    /// Whether a modification sets its flank back evenly.
-    pub(crate) is_set_back: bool,
 }
 
 /// The wave generator as it is made.
@@ -274,9 +271,7 @@ impl RingPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
         let space = ToothSpace::new(drive, MM_PER_UM * parameters.ring_clearance_um, &parameters.modification)?;
         let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * space.outermost_radius_mm());
-        let has_clearance = parameters.ring_clearance_um > 0.0;
-        let is_set_back = parameters.modification.ring_equidistant_um > 0.0;
-        Ok(Self { space, outer_radius_mm, has_clearance, is_set_back })
+        Ok(Self { space, outer_radius_mm })
     }
 }
 

@@ -15,6 +15,8 @@ pub enum Parameter {
     Eccentricity,
     /// `U`: number of lobes.
     Lobes,
+    /// `U` of a harmonic support function, of which one lobe is an eccentric circle.
+    HarmonicLobes,
     /// `R0` of a harmonic support function, mm.
     MeanRadius,
     /// `R` of a harmonic path, mm.
@@ -255,6 +257,7 @@ impl Parameter {
             | Self::BearingRadius
             | Self::ChordTolerance => Range::closed(1e-6, 1e6, "mm"),
             Self::Lobes => Range::closed(1.0, MAX_LOBES as f64, ""),
+            Self::HarmonicLobes => Range::closed(2.0, MAX_LOBES as f64, ""),
             Self::ToothCount | Self::InstalledTeeth | Self::RingTeeth => Range::closed(2.0, MAX_TEETH as f64, ""),
             Self::YoungsModulus(_) => Range::closed(1e-3, 1e5, "GPa"),
             Self::PoissonsRatio(_) => Range { low: -1.0, high: 0.5, closed: false, unit: "" },

@@ -9,7 +9,6 @@ use toothwave_calculation::json::{Tree, word};
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question as _};
 use toothwave_calculation::sweep::{CheckedSweep, Sweep};
-use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::parts::{LEAST_WALL, RIM};
 use toothwave_solver::violation::{Misfit, Parameter, Violation};
 use toothwave_solver::{Drive, Part, SolveError, Stop};
@@ -120,11 +119,7 @@ impl Evaluator {
         }
         let sweep = checked.solve(stop)?;
         let losses = if self.takes_losses { checked.loss_totals(&sweep, stop)? } else { None };
-        let radial_forces = if self.takes_radial_forces {
-            RadialForces::of(checked.drive(), checked.load(), checked.deviations(), &sweep, stop)?
-        } else {
-            None
-        };
+        let radial_forces = if self.takes_radial_forces { checked.radial_forces(&sweep, stop)? } else { None };
         Ok(Loaded { checked, peaks: (&sweep).into(), losses, radial_forces })
     }
 

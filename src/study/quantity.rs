@@ -2,13 +2,12 @@
 
 use serde::Serialize;
 use toothwave_calculation::sweep::CheckedSweep;
-use toothwave_calculation::sweep::losses::{LossTotalsAnswer, PressureVelocityAnswer};
-use toothwave_calculation::sweep::peak::PeakAnswer;
+use toothwave_solver::losses::duty::LossTotals;
 use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::root::NotConverged;
-use toothwave_solver::sweep::{ContactPeaks, SweepPeaks};
-use toothwave_solver::{Contact, Drive};
+use toothwave_solver::sweep::{ContactPeaks, Peak, SweepPeaks};
+use toothwave_solver::{Contact, Drive, PerContact};
 use utoipa::ToSchema;
 
 /// Source of a quantity.
@@ -117,8 +116,8 @@ pub(crate) struct Variant<'a> {
 pub(crate) struct Loaded<'a> {
     pub(crate) checked: &'a CheckedSweep,
     pub(crate) peaks: SweepPeaks,
-    /// Losses over all points of a duty. The other results are those of its hardest point.
-    pub(crate) losses: Option<LossTotalsAnswer>,
+    /// Over all points of a duty; the rest is of its hardest.
+    pub(crate) losses: Option<LossTotals>,
     pub(crate) radial_forces: Option<RadialForces>,
 }
 
@@ -143,12 +142,13 @@ impl Variant<'_> {
         })
     }
 
-    fn losses(&self, of: impl Fn(&LossTotalsAnswer) -> f64) -> f64 {
+    fn losses(&self, of: impl Fn(&LossTotals) -> f64) -> f64 {
         self.loaded(|loaded| loaded.losses.as_ref().map_or(f64::NAN, &of))
     }
 
-    fn pressure_velocity(&self, of: impl Fn(&PressureVelocityAnswer) -> &PeakAnswer) -> f64 {
-        self.losses(|losses| losses.pressure_velocity_mpa_m_per_s.as_ref().map_or(f64::NAN, |peaks| of(peaks).value))
+    fn pressure_velocity(&self, contact: Contact) -> f64 {
+        let value = |peaks: PerContact<Peak>| peaks.get(contact).value;
+        self.losses(|losses| losses.pressure_velocity_mpa_m_per_s.map_or(f64::NAN, value))
     }
 }
 
@@ -229,8 +229,8 @@ const fn sweep(pointer: &'static str) -> Source {
 pub(crate) const TRANSMISSION_RATIO: &str = "transmission_ratio";
 pub(crate) const OUTER_DIAMETER_MM: &str = "outer_diameter_mm";
 
-/// All quantities, in the order of the list.
-pub static QUANTITIES: [Quantity; 60] = [
+/// All quantities, in the order in which they are listed.
+pub static QUANTITIES: [Quantity; 56] = [
     of_drive(
         TRANSMISSION_RATIO,
         "",
@@ -601,34 +601,10 @@ pub static QUANTITIES: [Quantity; 60] = [
         |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed)),
     ),
     efficiency(
-        "efficiency_carrier_fixed",
-        "Efficiency if the wave generator drives the ring.",
-        sweep("/losses/efficiency/carrier_fixed"),
-        |variant| Ok(variant.losses(|losses| losses.efficiency.carrier_fixed)),
-    ),
-    efficiency(
-        "efficiency_wave_generator_fixed",
-        "Efficiency if the ring drives the carrier.",
-        sweep("/losses/efficiency/wave_generator_fixed"),
-        |variant| Ok(variant.losses(|losses| losses.efficiency.wave_generator_fixed)),
-    ),
-    efficiency(
         "efficiency_ring_fixed_back_driven",
         "Efficiency if the carrier drives the wave generator. At or below 0 the drive is self-locking.",
         sweep("/losses/efficiency/ring_fixed_back_driven"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed_back_driven)),
-    ),
-    efficiency(
-        "efficiency_carrier_fixed_back_driven",
-        "Efficiency if the ring drives the wave generator.",
-        sweep("/losses/efficiency/carrier_fixed_back_driven"),
-        |variant| Ok(variant.losses(|losses| losses.efficiency.carrier_fixed_back_driven)),
-    ),
-    efficiency(
-        "efficiency_wave_generator_fixed_back_driven",
-        "Efficiency if the carrier drives the ring.",
-        sweep("/losses/efficiency/wave_generator_fixed_back_driven"),
-        |variant| Ok(variant.losses(|losses| losses.efficiency.wave_generator_fixed_back_driven)),
     ),
     of_losses(
         "efficiency_error",
@@ -651,19 +627,19 @@ pub static QUANTITIES: [Quantity; 60] = [
         "pressure_velocity_wave_generator_mpa_m_per_s",
         "Largest product of contact stress and sliding speed at the wave generator.",
         sweep("/losses/pressure_velocity_mpa_m_per_s/wave_generator/value"),
-        |variant| Ok(variant.pressure_velocity(|peaks| &peaks.wave_generator)),
+        |variant| Ok(variant.pressure_velocity(Contact::WaveGenerator)),
     ),
     pressure_velocity(
         "pressure_velocity_ring_mpa_m_per_s",
         "Largest product of contact stress and sliding speed at the ring.",
         sweep("/losses/pressure_velocity_mpa_m_per_s/ring/value"),
-        |variant| Ok(variant.pressure_velocity(|peaks| &peaks.ring)),
+        |variant| Ok(variant.pressure_velocity(Contact::Ring)),
     ),
     pressure_velocity(
         "pressure_velocity_carrier_mpa_m_per_s",
         "Largest product of contact stress and sliding speed at the carrier.",
         sweep("/losses/pressure_velocity_mpa_m_per_s/carrier/value"),
-        |variant| Ok(variant.pressure_velocity(|peaks| &peaks.carrier)),
+        |variant| Ok(variant.pressure_velocity(Contact::Carrier)),
     ),
 ];
 

@@ -495,7 +495,29 @@ async fn slender_fingers_and_soft_rim_state_estimated_share() {
     }
 }
 
-/// Returns a drive with balls of 3 mm around an eccentric circle, in equal grooves.
+#[tokio::test]
+async fn estimated_series_compliance_is_that_of_held_parts() {
+    let parts = json!({ "carrier": { "fingers": "held_at_one_end" }, "ring": { "rim": "free" }, "wave_generator": { "bore_radius_mm": 20.0 } });
+    let document = held(parts);
+    let series = |value: Value| with(&document, "/model", json!({ "series_compliance_mm_per_n": value }));
+    let swept = async |document: &Value| Service::new().post("/v1/sweep", document).await.found();
+    let estimates = swept(&document).await["series_compliance_estimates"].as_array().unwrap().clone();
+    let as_held = estimates.iter().filter(|estimate| estimate["is_as_held"] == true);
+    let by_hand: serde_json::Map<_, _> = as_held
+        .map(|estimate| (estimate["contact"].as_str().unwrap().to_owned(), estimate["compliance_mm_per_n"].clone()))
+        .collect();
+    assert_eq!(by_hand.len(), 3);
+    let estimated = swept(&series(json!("estimated"))).await;
+    assert_eq!(estimated, swept(&series(by_hand.clone().into())).await);
+    assert_eq!(estimated["model"]["series_compliance_mm_per_n"], Value::from(by_hand));
+    for (wrong, code) in [(json!("measured"), "unknown_choice"), (json!(1e-6), "wrong_type")] {
+        let problem = Service::new().post("/v1/sweep", &series(wrong)).await.refused(422, "invalid_document");
+        let error = &problem["errors"][0];
+        assert_eq!((&error["pointer"], &error["code"]), (&json!("/model/series_compliance_mm_per_n"), &json!(code)));
+    }
+}
+
+/// Balls of 3 mm around an eccentric circle, in grooves of this radius everywhere.
 fn grooved(groove_radius_mm: f64) -> Value {
     let grooves = json!({ "wave_generator": groove_radius_mm, "ring": groove_radius_mm, "carrier": groove_radius_mm });
     let teeth = json!({ "shape": "ball", "count": 16, "radius_mm": 3.0, "groove_radius_mm": grooves });

@@ -6,14 +6,13 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use proptest::prelude::*;
 use toothwave_solver::drawing::{Body, Drawing, DrawingParameters, Edge, Outline, Subject};
 use toothwave_solver::drive::{Draft, DriveError};
-use toothwave_solver::findings::Wall;
 use toothwave_solver::gaps::{Gaps, TipRelief};
 use toothwave_solver::mesh::Place;
 use toothwave_solver::parts::{LEAST_WALL, PartsParameters, RIM};
 use toothwave_solver::violation::{Misfit, Modified};
 use toothwave_solver::{
-    Drive, DriveParameters, Finding, Modification, Never, Parameter, Part, PerContact, Position, ToothShape, Violation,
-    WaveGenerator,
+    Contact, Drive, DriveParameters, Finding, FindingCode, Modification, Never, Parameter, Part, PerContact, Position,
+    ToothShape, Violation, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, cases, drive, ellipse};
@@ -569,10 +568,8 @@ proptest! {
         prop_assert!((radius_mm - RIM * reach_mm).abs() < 1e-12 * radius_mm);
         let thin = PartsParameters { ring_outer_radius_mm: Some(reach_mm * (1.0 + 1e-3)), ..parts };
         let found = Drawing::new(&draft, Subject::Part(Part::Ring), &thin, &parameters).unwrap().findings().unwrap();
-        let walls: Vec<_> = found.iter().filter_map(|finding| match *finding {
-            Finding::ThinWallAsMade { wall: Wall::RingRim, wall_mm, .. } => Some(wall_mm),
-            _ => None,
-        }).collect();
+        let is_rim = |finding: &&Finding| finding.code == FindingCode::ThinWallAsMade && finding.contact == Some(Contact::Ring);
+        let walls: Vec<_> = found.iter().filter(is_rim).map(|finding| finding.value).collect();
         prop_assert!(matches!(walls[..], [wall_mm] if (wall_mm - 1e-3 * reach_mm).abs() < 1e-11 * reach_mm), "{walls:?}");
     }
 }

@@ -5,11 +5,12 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Rotation2};
 use toothwave_solver::drawing::{Drawing, DrawingParameters, Edge, Outline, Subject, widest_finger};
 use toothwave_solver::drive::Draft;
-use toothwave_solver::findings::{self, Edge as CarrierEdge, Wall};
+use toothwave_solver::findings;
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::{
-    Drive, DriveParameters, Finding, Modification, Never, Part, Position, SolveError, ToothShape, WaveGenerator,
+    Contact, Drive, DriveParameters, Finding, FindingCode, Modification, Never, Part, Position, Severity, SolveError,
+    ToothShape, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, drive, ellipse};
@@ -76,17 +77,12 @@ fn default_carrier_leaves_tenth_of_annulus_free() {
 fn tooth_presses_carrier_edge_outside_annulus() {
     let edges = |tooth_radius_mm| -> Vec<_> {
         let found = findings::of_drive(&drive(&DriveParameters { tooth_radius_mm, ..PAPER_5_1 })).unwrap();
-        let edge = |finding: &Finding| match *finding {
-            Finding::ToothBeyondCarrier { edge, center_radius_mm, limit_mm } => {
-                Some((edge, center_radius_mm, limit_mm))
-            }
-            _ => None,
-        };
-        found.iter().filter_map(edge).collect()
+        let edges = found.iter().filter(|finding| finding.code == FindingCode::ToothBeyondCarrier);
+        edges.map(|finding| (finding.value, finding.limit)).collect()
     };
     // Centres run from 56 + r to 58 + r, the annulus from 58 to 56 + 2r.
     assert_eq!(edges(2.1), []);
-    assert_eq!(edges(1.5), [(CarrierEdge::Inner, 57.5, 58.0), (CarrierEdge::Outer, 59.5, 59.0)]);
+    assert_eq!(edges(1.5), [(57.5, 58.0), (59.5, 59.0)]);
 }
 
 #[test]
@@ -257,9 +253,10 @@ fn undercut_by_clearance_reports_critical_distance() {
     };
     assert_eq!(of(&p, 0.999 * most_um), []);
     let found = of(&p, 1.001 * most_um);
-    let [Finding::ClearanceUndercutsRing { distance_mm, critical_distance_mm, .. }] = found[..] else {
+    let [Finding { code, value: distance_mm, limit: critical_distance_mm, .. }] = found[..] else {
         panic!("{found:?}")
     };
+    assert_eq!(code, FindingCode::ClearanceUndercutsRing);
     assert!((distance_mm - (r + 1.001e-3 * most_um)).abs() < 1e-12);
     assert!((critical_distance_mm - (r + 1e-3 * most_um)).abs() < 1e-9, "{critical_distance_mm} at {most_um} µm");
     // An undercut without the clearance gives no finding about it.
@@ -272,11 +269,13 @@ fn wall_below_quarter_of_slot_width_is_thin() {
     for (thickness_mm, is_thin) in [(2.499, true), (2.501, false)] {
         let rim = PartsParameters { ring_outer_radius_mm: Some(68.0 + thickness_mm), ..PartsParameters::default() };
         let bore = PartsParameters { bore_radius_mm: Some(56.0 - thickness_mm), ..PartsParameters::default() };
-        for (part, parts, wall) in [(Part::Ring, rim, Wall::RingRim), (Part::WaveGenerator, bore, Wall::Cam)] {
+        for (part, parts, wall) in
+            [(Part::Ring, rim, Contact::Ring), (Part::WaveGenerator, bore, Contact::WaveGenerator)]
+        {
             let found = findings_as_made(&PAPER_5_1, part, &parts);
             match found[..] {
-                [Finding::ThinWallAsMade { wall: thin, wall_mm, limit_mm }] if is_thin => {
-                    assert_eq!((thin, limit_mm), (wall, 2.5));
+                [Finding { code: FindingCode::ThinWallAsMade, value: wall_mm, limit, contact, .. }] if is_thin => {
+                    assert_eq!((contact, limit), (Some(wall), 2.5));
                     assert!((wall_mm - thickness_mm).abs() < 1e-12, "{wall_mm}");
                 }
                 ref others => assert!(others.is_empty() && !is_thin, "{others:?}"),
@@ -289,10 +288,8 @@ fn wall_below_quarter_of_slot_width_is_thin() {
         ..PartsParameters::default()
     };
     let found = findings_as_made(&PAPER_5_1, Part::WaveGenerator, &undercut_cam);
-    assert!(
-        matches!(found[..], [Finding::ThinWallAsMade { wall_mm, .. }] if (wall_mm - 2.4).abs() < 1e-12),
-        "{found:?}"
-    );
+    let [Finding { code: FindingCode::ThinWallAsMade, value: wall_mm, .. }] = found[..] else { panic!("{found:?}") };
+    assert!((wall_mm - 2.4).abs() < 1e-12, "{wall_mm}");
 }
 
 #[test]
@@ -305,24 +302,19 @@ fn tooth_leaves_slot_with_short_walls() {
             carrier_outer_radius_mm: Some(outer_mm),
             ..PartsParameters::default()
         };
-        let found = findings_as_made(&PAPER_5_1, Part::Carrier, &parts);
-        let edge = |finding: &Finding| match *finding {
-            Finding::ToothLeavesSlot { edge, center_radius_mm, wall_end_mm, is_loaded } => {
-                (edge, center_radius_mm, wall_end_mm, is_loaded)
-            }
-            ref other => panic!("{other:?}"),
-        };
-        found.iter().map(edge).collect::<Vec<_>>()
+        findings_as_made(&PAPER_5_1, Part::Carrier, &parts)
     };
     // Between 60.9 and 63.1 the wall holds all teeth.
     let (enough_inner, enough_outer) = (60.9_f64.hypot(5.0), 63.1_f64.hypot(5.0));
     assert_eq!(of(enough_inner, enough_outer), []);
-    for (found, edge, center_mm, radius_mm) in [
-        (of(61.1_f64.hypot(5.0), enough_outer), CarrierEdge::Inner, 61.0, 61.1_f64.hypot(5.0)),
-        (of(enough_inner, 62.9_f64.hypot(5.0)), CarrierEdge::Outer, 63.0, 62.9_f64.hypot(5.0)),
+    for (found, center_mm, radius_mm) in [
+        (of(61.1_f64.hypot(5.0), enough_outer), 61.0, 61.1_f64.hypot(5.0)),
+        (of(enough_inner, 62.9_f64.hypot(5.0)), 63.0, 62.9_f64.hypot(5.0)),
     ] {
-        let [(found_edge, center_radius_mm, end_mm, is_loaded)] = found[..] else { panic!("{found:?}") };
-        assert_eq!((found_edge, is_loaded), (edge, true));
+        let [Finding { code, severity, value: center_radius_mm, limit: end_mm, .. }] = found[..] else {
+            panic!("{found:?}")
+        };
+        assert_eq!((code, severity), (FindingCode::ToothLeavesSlot, Severity::Warning));
         assert!((center_radius_mm - center_mm).abs() < 1e-9 && (end_mm - wall_end_mm(radius_mm)).abs() < 1e-12);
     }
 }

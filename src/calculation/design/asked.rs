@@ -138,27 +138,7 @@ pub struct RingPartDocument {
     /// housing, assumed by the findings.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub rim: Option<RimDocument>,
-}
-
-/// Support of the ring's rim.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum RimDocument {
-    /// The rim is in a rigid housing.
-    Housed,
-    /// The rim is free to deform; the ring is only kept from rotating.
-    Free,
-}
-
-/// Support of the carrier's fingers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum FingersDocument {
-    /// A disc at both ends of the fingers.
-    HeldAtBothEnds,
-    /// A disc at one end of the fingers.
-    HeldAtOneEnd,
+    pub rim: Option<Rim>,
 }
 
 /// The carrier as manufactured.
@@ -183,7 +163,7 @@ pub struct CarrierPartDocument {
     /// Default: held at both ends, assumed by the findings.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub fingers: Option<FingersDocument>,
+    pub fingers: Option<Fingers>,
 }
 
 /// Position of the parts in a drawing of the assembly.
@@ -207,8 +187,8 @@ encoded! {
 }
 
 encoded!(enum ExtentDocument);
-encoded!(enum RimDocument);
-encoded!(enum FingersDocument);
+encoded!(enum Rim);
+encoded!(enum Fingers);
 
 /// Without the support of the part, which drawings do not use. Keys that need it add it.
 impl Encode for RingPartDocument {
@@ -223,23 +203,5 @@ impl Encode for CarrierPartDocument {
     fn encode(&self, encoder: &mut Encoder) {
         let Self { inner_radius_mm, outer_radius_mm, clearance_um, fingers: _ } = self;
         (inner_radius_mm, outer_radius_mm, clearance_um).encode(encoder);
-    }
-}
-
-impl From<RimDocument> for Rim {
-    fn from(rim: RimDocument) -> Self {
-        match rim {
-            RimDocument::Housed => Self::Housed,
-            RimDocument::Free => Self::Free,
-        }
-    }
-}
-
-impl From<FingersDocument> for Fingers {
-    fn from(fingers: FingersDocument) -> Self {
-        match fingers {
-            FingersDocument::HeldAtBothEnds => Self::HeldAtBothEnds,
-            FingersDocument::HeldAtOneEnd => Self::HeldAtOneEnd,
-        }
     }
 }

@@ -62,8 +62,8 @@ pub struct EccentricDocument {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct HarmonicDocument {
-    /// Number of lobes U, and of meshing zones.
-    #[schema(value_type = i64, minimum = 1, maximum = 1000)]
+    /// Lobes U: teeth pass as many meshing zones in a turn. With one the cam is an `eccentric`.
+    #[schema(value_type = i64, minimum = 2, maximum = 1000)]
     pub lobes: Whole,
     /// Mean radius R0, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]

@@ -1,8 +1,9 @@
 //! Friction of the contacts.
 
 use serde::{Deserialize, Serialize};
-use toothwave_solver::losses::bearing::RollingElement;
-use toothwave_solver::losses::{FrictionParameters, RaceBearing, WaveGeneratorFriction};
+use toothwave_solver::losses::bearing::{BearingRating, RollingElement};
+use toothwave_solver::losses::duty::LossParameters;
+use toothwave_solver::losses::{Friction, FrictionParameters, RaceBearing, WaveGeneratorFriction};
 use toothwave_solver::{Contact, Parameter, PerContact, Violation};
 use utoipa::ToSchema;
 
@@ -41,19 +42,7 @@ pub struct WearRatesDocument {
     pub carrier: f64,
 }
 
-/// Rolling element of a bearing. The life falls with the power 3 of the load for balls, and with the power 10/3 for
-/// rollers.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum BearingElementDocument {
-    /// Balls.
-    #[default]
-    Ball,
-    /// Rollers.
-    Roller,
-}
-
-/// Friction of a sliding contact.
+/// Friction of a contact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct CoefficientDocument {
@@ -95,7 +84,7 @@ pub struct RaceDocument {
     pub bearing_load_rating_n: Option<f64>,
     /// Rolling element of the bearing. Default: ball.
     #[serde(default)]
-    pub bearing_element: BearingElementDocument,
+    pub bearing_element: RollingElement,
 }
 
 /// A race that is at rest relative to the carrier and does not slide on the teeth: the limit of a light bearing.
@@ -119,37 +108,50 @@ pub struct RollingDocument {
     pub bearing_load_rating_n: Option<f64>,
     /// Rolling element of the bearing. Default: ball.
     #[serde(default)]
-    pub bearing_element: BearingElementDocument,
-}
-
-/// Data for the life of a bearing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BearingRating {
-    /// C, in N.
-    pub dynamic_load_rating_n: f64,
-    /// Rolling element.
-    pub element: RollingElement,
+    pub bearing_element: RollingElement,
 }
 
 impl FrictionDocument {
-    /// Returns the wear rates, if given.
-    pub fn wear_rate_mm3_per_nm(&self) -> Option<PerContact<f64>> {
+    /// What a sweep is asked about friction.
+    ///
+    /// # Errors
+    /// Every value that is out of its range, and a rating of a bearing where the wave generator is no eccentric circle.
+    pub(super) fn loss_parameters(&self, is_eccentric: bool) -> Result<LossParameters, Vec<Violation>> {
+        let mut violations = self.violations_beside();
+        if self.bearing_rating().is_some() && !is_eccentric {
+            violations.push(Violation::NoBearingLife);
+        }
+        match Friction::new(&self.into()) {
+            Ok(friction) if violations.is_empty() => {
+                let (wear_rate_mm3_per_nm, bearing) = (self.wear_rate_mm3_per_nm(), self.bearing_rating());
+                Ok(LossParameters { friction, wear_rate_mm3_per_nm, bearing })
+            }
+            friction => {
+                violations.extend(friction.err().into_iter().flatten());
+                Err(violations)
+            }
+        }
+    }
+
+    /// The wear rates, where there are any.
+    fn wear_rate_mm3_per_nm(&self) -> Option<PerContact<f64>> {
         let WearRatesDocument { wave_generator, ring, carrier } = *self.wear_rate_mm3_per_nm.as_ref()?;
         Some(PerContact { wave_generator, ring, carrier })
     }
 
-    /// Returns the data for the life of the bearing, if a load rating is given.
-    pub fn bearing_rating(&self) -> Option<BearingRating> {
+    /// What the life of the bearing follows from, where it is asked for.
+    fn bearing_rating(&self) -> Option<BearingRating> {
         let (rating_n, element) = match &self.wave_generator {
             WaveGeneratorFrictionDocument::Plain(_) => return None,
             WaveGeneratorFrictionDocument::Race(race) => (race.bearing_load_rating_n, race.bearing_element),
             WaveGeneratorFrictionDocument::Rolling(rolling) => (rolling.bearing_load_rating_n, rolling.bearing_element),
         };
-        Some(BearingRating { dynamic_load_rating_n: rating_n?, element: element.into() })
+        Some(BearingRating { dynamic_load_rating_n: rating_n?, element })
     }
 
-    /// Returns the violations other than of friction itself: wear rates, load rating, and an unused coefficient.
-    pub(super) fn violations_beside(&self) -> Vec<Violation> {
+    /// What is out of its range beside friction itself: wear rates, the bearing's rating, and a coefficient that stands where nothing depends on
+    /// it.
+    fn violations_beside(&self) -> Vec<Violation> {
         let rates = self.wear_rate_mm3_per_nm();
         let rates =
             rates.iter().flat_map(|rates| rates.iter().map(|(contact, &rate)| (Parameter::WearRate(contact), rate)));
@@ -192,15 +194,6 @@ impl From<&FrictionDocument> for FrictionParameters {
     }
 }
 
-impl From<BearingElementDocument> for RollingElement {
-    fn from(document: BearingElementDocument) -> Self {
-        match document {
-            BearingElementDocument::Ball => Self::Ball,
-            BearingElementDocument::Roller => Self::Roller,
-        }
-    }
-}
-
 encoded! {
     struct FrictionDocument { wave_generator, ring, carrier, wear_rate_mm3_per_nm }
     struct CoefficientDocument { coefficient }
@@ -209,4 +202,4 @@ encoded! {
     struct RollingDocument { coefficient, bearing_coefficient, bearing_radius_mm, bearing_load_rating_n, bearing_element }
 }
 
-encoded!(enum BearingElementDocument);
+encoded!(enum RollingElement);

@@ -1,13 +1,19 @@
 //! The model of load sharing.
 
-use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use toothwave_solver::{Compatibility, ContactLaw, PerContact};
-use utoipa::ToSchema;
+use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
+use utoipa::openapi::{Ref, RefOr};
+use utoipa::{PartialSchema, ToSchema};
 
 use super::drive::LengthsByContactDocument;
 use super::number::given;
 use super::refinements::RefinementsDocument;
-use crate::key::encoded;
+use crate::key::{Encode, Encoder, encoded};
 use crate::union::union;
 
 /// The model of load sharing.
@@ -16,15 +22,15 @@ use crate::union::union;
 pub struct ModelDocument {
     /// Compatibility: relation of the approaches at a tooth's contacts. Default: `virtual_work`.
     #[serde(default)]
-    pub compatibility: CompatibilityDocument,
-    /// Contact law. If left out: `hertz` for balls, `linear` for other teeth with `projection`, otherwise `johnson`.
+    pub compatibility: Compatibility,
+    /// The contact law; left out, `hertz` of balls, of other teeth `johnson`, and `linear` beside `projection`.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub stiffness: Option<StiffnessDocument>,
     /// Compliance of the supports, in series with each contact, in mm/N. Needs `virtual_work`. Default: 0 mm/N.
     #[serde(default)]
-    pub series_compliance_mm_per_n: CompliancesDocument,
-    /// Refinements of the model. Need `virtual_work`. Default: `auto`.
+    pub series_compliance_mm_per_n: SeriesComplianceDocument,
+    /// Which refinements the model has, with `virtual_work` alone.
     #[serde(default)]
     pub refinements: RefinementsDocument,
     /// Use `refinements`. Overrides it for `ring_teeth_bend`.
@@ -61,15 +67,13 @@ pub struct ClearanceDocument {
     pub carrier_um: f64,
 }
 
-/// Compatibility: relation of the approaches at a tooth's contacts to the rotation of the wave generator.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum CompatibilityDocument {
-    /// The paper's form: each approach projected on the direction of the wave generator's force.
-    Projection,
-    /// Virtual work: the frictionless solution for a tooth whose centre can move freely.
-    #[default]
-    VirtualWork,
+/// What stands behind the contacts: numbers, or what is estimated from the parts as they are held.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SeriesComplianceDocument {
+    /// What a sweep lists as `series_compliance_estimates` of the parts as they are held; a part without an estimate is rigid.
+    Estimated,
+    /// Numbers.
+    Given(CompliancesDocument),
 }
 
 /// Compliance for each contact, in mm/N.
@@ -160,47 +164,101 @@ impl From<&StiffnessDocument> for ContactLaw {
     }
 }
 
-/// Name of a contact law.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum LawName {
-    /// The paper's `k = π L1 E*/2`.
-    Linear,
-    /// Given stiffnesses.
-    Fixed,
-    /// Palmgren's law.
-    Palmgren,
-    /// Johnson's law.
-    Johnson,
-    /// Hertz's law.
-    Hertz,
-}
+/// The word that stands for the estimates.
+const ESTIMATED: &str = "estimated";
 
-impl From<ContactLaw> for LawName {
-    fn from(law: ContactLaw) -> Self {
-        match law {
-            ContactLaw::Linear => Self::Linear,
-            ContactLaw::Fixed(_) => Self::Fixed,
-            ContactLaw::Palmgren => Self::Palmgren,
-            ContactLaw::Johnson { .. } => Self::Johnson,
-            ContactLaw::Hertz => Self::Hertz,
+impl SeriesComplianceDocument {
+    /// The numbers, none of which stands for estimates.
+    pub(crate) const fn given(&self) -> Option<PerContact<f64>> {
+        match *self {
+            Self::Estimated => None,
+            Self::Given(CompliancesDocument { wave_generator, ring, carrier }) => {
+                Some(PerContact { wave_generator, ring, carrier })
+            }
         }
     }
 }
 
-impl From<Compatibility> for CompatibilityDocument {
-    fn from(compatibility: Compatibility) -> Self {
-        match compatibility {
-            Compatibility::Projection => Self::Projection,
-            Compatibility::VirtualWork => Self::VirtualWork,
+impl Default for SeriesComplianceDocument {
+    fn default() -> Self {
+        Self::Given(CompliancesDocument::default())
+    }
+}
+
+impl From<PerContact<f64>> for SeriesComplianceDocument {
+    fn from(PerContact { wave_generator, ring, carrier }: PerContact<f64>) -> Self {
+        Self::Given(CompliancesDocument { wave_generator, ring, carrier })
+    }
+}
+
+impl Serialize for SeriesComplianceDocument {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Estimated => serializer.serialize_str(ESTIMATED),
+            Self::Given(compliances) => compliances.serialize(serializer),
         }
     }
 }
 
-impl From<&CompliancesDocument> for PerContact<f64> {
-    fn from(document: &CompliancesDocument) -> Self {
-        let CompliancesDocument { wave_generator, ring, carrier } = *document;
-        Self { wave_generator, ring, carrier }
+/// Told apart by what stands there, so that a fault keeps its place.
+impl<'de> Deserialize<'de> for SeriesComplianceDocument {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct WordOrObject;
+
+        impl<'de> Visitor<'de> for WordOrObject {
+            type Value = SeriesComplianceDocument;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("`estimated`, or an object with a number for each contact")
+            }
+
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<Self::Value, E> {
+                match word {
+                    ESTIMATED => Ok(SeriesComplianceDocument::Estimated),
+                    _ => Err(E::unknown_variant(word, &[ESTIMATED])),
+                }
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, fields: A) -> Result<Self::Value, A::Error> {
+                let deserializer = MapAccessDeserializer::new(fields);
+                CompliancesDocument::deserialize(deserializer).map(SeriesComplianceDocument::Given)
+            }
+        }
+
+        deserializer.deserialize_any(WordOrObject)
+    }
+}
+
+impl PartialSchema for SeriesComplianceDocument {
+    fn schema() -> RefOr<Schema> {
+        OneOfBuilder::new()
+            .description(Some(
+                "What stands behind each contact and gives way too: numbers, or `estimated` for those of \
+                 `series_compliance_estimates` whose parts are held so.",
+            ))
+            .item(ObjectBuilder::new().schema_type(Type::String).enum_values(Some([ESTIMATED])))
+            .item(Ref::from_schema_name(CompliancesDocument::name()))
+            .into()
+    }
+}
+
+impl ToSchema for SeriesComplianceDocument {
+    fn name() -> Cow<'static, str> {
+        Cow::Borrowed("SeriesCompliance")
+    }
+
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        schemas.push((CompliancesDocument::name().into(), CompliancesDocument::schema()));
+    }
+}
+
+impl Encode for SeriesComplianceDocument {
+    fn encode(&self, encoder: &mut Encoder) {
+        let given = match self {
+            Self::Estimated => None,
+            Self::Given(compliances) => Some(compliances),
+        };
+        given.encode(encoder);
     }
 }
 
@@ -217,4 +275,4 @@ encoded! {
     struct HertzDocument {}
 }
 
-encoded!(enum CompatibilityDocument);
+encoded!(enum Compatibility);

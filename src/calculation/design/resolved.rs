@@ -2,11 +2,13 @@
 
 use toothwave_solver::drive::Draft;
 use toothwave_solver::violation::Modified;
-use toothwave_solver::{Deviations, Modification, Parameter, Part, PerContact, Violation, model_error};
+use toothwave_solver::{
+    Compatibility, Deviations, LoadCase, Modification, Parameter, Part, PerContact, Violation, model_error,
+};
 
 use super::{
-    ClearanceDocument, CompatibilityDocument, Design, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
-    Refinements, RefinementsDocument, StiffnessDocument, TeethDocument,
+    ClearanceDocument, Design, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument, Refinements,
+    RefinementsDocument, StiffnessDocument, TeethDocument,
 };
 use crate::field::{FieldCode, contact_name, pointer};
 use crate::json::Fault;
@@ -167,7 +169,7 @@ impl Design {
     /// # Errors
     /// The conflict, as a fault.
     pub fn require_one_choice_of_refinements(&self) -> Result<(), Fault> {
-        let is_projection = self.model.compatibility == CompatibilityDocument::Projection;
+        let is_projection = self.model.compatibility == Compatibility::Projection;
         let is_chosen = self.model.refinements != RefinementsDocument::AUTO;
         for (field, is_on) in self.model.switches() {
             let detail = match is_on {
@@ -216,11 +218,11 @@ impl Design {
     fn refinements_of(
         &self,
         asked: RefinementsDocument,
-        compatibility: CompatibilityDocument,
+        compatibility: Compatibility,
         has_pointed_tips: bool,
     ) -> Refinements {
         let by_geometry = match compatibility {
-            CompatibilityDocument::VirtualWork if asked.auto => self.refinements_by_geometry(has_pointed_tips),
+            Compatibility::VirtualWork if asked.auto => self.refinements_by_geometry(has_pointed_tips),
             _ => Refinements::NONE,
         };
         let refinements = by_geometry.with(asked.listed);
@@ -241,17 +243,17 @@ impl Design {
 
     /// Returns the refinements under virtual work, whatever the document's compatibility.
     pub fn refinements_by_virtual_work(&self, has_pointed_tips: bool) -> Refinements {
-        self.refinements_of(self.model.refinements, CompatibilityDocument::VirtualWork, has_pointed_tips)
+        self.refinements_of(self.model.refinements, Compatibility::VirtualWork, has_pointed_tips)
     }
 
     /// Returns the default contact law: the most accurate one, or the paper's law with the paper's compatibility.
     fn law_by_default(&self) -> StiffnessDocument {
         match (&self.drive.teeth, self.model.compatibility) {
             (TeethDocument::Ball(_), _) => StiffnessDocument::Hertz(HertzDocument::default()),
-            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), CompatibilityDocument::Projection) => {
+            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), Compatibility::Projection) => {
                 StiffnessDocument::Linear(LinearDocument::default())
             }
-            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), CompatibilityDocument::VirtualWork) => {
+            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), Compatibility::VirtualWork) => {
                 StiffnessDocument::Johnson(JohnsonDocument::default())
             }
         }
@@ -269,12 +271,12 @@ impl Design {
         stiffness
     }
 
-    /// Returns the complete model, for a drive with or without pointed or bored tips.
-    pub fn complete_model(&self, has_pointed_tips: bool) -> ModelDocument {
+    /// The complete model of a load, for a drive that has pointed or bored tips or not.
+    pub fn complete_model(&self, load: &LoadCase, has_pointed_tips: bool) -> ModelDocument {
         ModelDocument {
             compatibility: self.model.compatibility,
             stiffness: Some(self.stiffness()),
-            series_compliance_mm_per_n: self.model.series_compliance_mm_per_n.clone(),
+            series_compliance_mm_per_n: load.parameters().series_compliance_mm_per_n.into(),
             refinements: RefinementsDocument::only(self.refinements(has_pointed_tips)),
             ..ModelDocument::default()
         }

@@ -1,19 +1,19 @@
 //! Answer of a sweep.
 
 use serde::Serialize;
-use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, States, TorqueCapacity};
-use toothwave_solver::{Drive, PerContact};
+use toothwave_solver::Drive;
+pub use toothwave_solver::PerContact;
+pub use toothwave_solver::mesh::TeethInMesh;
+pub use toothwave_solver::model_error::ModelError;
+pub use toothwave_solver::sweep::TorqueCapacity;
+use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, Peak, States};
 use utoipa::ToSchema;
 
-use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::design::ModelDocument;
 use crate::findings::FindingAnswer;
 use crate::sweep::backing::EstimateAnswer;
-use crate::sweep::contact::ContactName;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
-use crate::sweep::model_error::ModelErrorAnswer;
-use crate::sweep::peak::PeakAnswer;
 
 /// Forces and contact stresses over one period: of one meshing zone if the zones are alike, otherwise of all zones.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -36,13 +36,13 @@ pub struct SweepAnswer {
     /// True if a tooth takes load as soon as it enters, because its flank ends before its lever arm becomes zero. The
     /// loads of the other teeth then jump.
     pub enters_under_load: bool,
-    /// Largest force and stress of each contact, over the states.
-    pub peaks: PeaksAnswer,
-    /// Number of teeth in mesh over the input angle: of one zone if the zones are alike, otherwise of all zones.
-    pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
-    /// Number of those teeth that carry load, over the input angles of the sweep; fewer with clearance.
-    pub loaded_teeth_per_zone: TeethInMeshAnswer,
-    /// States: one for each input angle and tooth in mesh.
+    /// The largest force and stress of each contact, over the states.
+    pub peaks: PerContact<ContactPeaksAnswer>,
+    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
+    pub teeth_in_mesh_per_zone: TeethInMesh,
+    /// How many of them carry load, over the input angles of the sweep: with clearance fewer.
+    pub loaded_teeth_per_zone: TeethInMesh,
+    /// The states.
     pub states: StatesAnswer,
     /// Wind-up and torsional stiffness, with `sweep.wind_up`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -51,9 +51,8 @@ pub struct SweepAnswer {
     /// Torque capacity, with `load.allowable_stress_mpa`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub torque_capacity: Option<TorqueCapacityAnswer>,
-    /// Results for the points of the duty, with `load.duty`. All other results are for the point with the largest
-    /// torque.
+    pub torque_capacity: Option<TorqueCapacity>,
+    /// The points of the duty, given `load.duty`: what stands beside it is of the one with the largest torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub duty: Option<DutyAnswer>,
@@ -68,11 +67,10 @@ pub struct SweepAnswer {
     pub radial_force_n: Option<RadialForceAnswer>,
     /// The complete model that was used. As `model` of the document it gives the same answer.
     pub model: ModelDocument,
-    /// Error of the model compared with elastic bodies.
-    pub model_error: ModelErrorAnswer,
-    /// Estimated compliances of the supports, from the document's `parts`, each as a value for
-    /// `model.series_compliance_mm_per_n`. The forces do not include them. Empty for parts that cannot be made and for
-    /// balls.
+    /// How far the model is off elastic bodies.
+    pub model_error: ModelError,
+    /// What gives way behind the contacts, estimated from the document's `parts`, each a number for `model.series_compliance_mm_per_n`; nothing of it is in the
+    /// forces. Of parts that cannot be made, and of balls, there are none.
     pub series_compliance_estimates: Vec<EstimateAnswer>,
     /// Residuals of conditions that the results must meet.
     pub checks: ChecksAnswer,
@@ -89,25 +87,14 @@ pub struct LoadAnswer {
     pub output_torque_nm: f64,
 }
 
-/// Peaks of each contact.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct PeaksAnswer {
-    /// Between tooth and wave generator.
-    pub wave_generator: ContactPeaksAnswer,
-    /// Between tooth and ring.
-    pub ring: ContactPeaksAnswer,
-    /// Between tooth and carrier.
-    pub carrier: ContactPeaksAnswer,
-}
-
-/// Peaks of a contact.
+/// The peaks of a contact.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ContactPeaksAnswer {
-    /// Peak of the normal force, in N.
-    pub force_n: PeakAnswer,
-    /// Peak of the Hertz stress, in MPa.
-    pub stress_mpa: PeakAnswer,
-    /// Half the width of the contact in the plane of motion at the stress peak, in mm.
+    /// Of its normal force, in N.
+    pub force_n: Peak,
+    /// Of its Hertz stress, in MPa.
+    pub stress_mpa: Peak,
+    /// Half the width of the contact, in the plane of motion, where the stress has its peak.
     pub half_width_mm: f64,
     /// Half the length of the contact along the axis at the stress peak, in mm. Only for balls.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -187,24 +174,6 @@ pub struct WindUpAnswer {
     pub loaded_teeth: Vec<u32>,
 }
 
-/// Torque capacity: largest torque under which no contact exceeds the allowable stress, over the input angles of the
-/// sweep.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct TorqueCapacityAnswer {
-    /// Torque at the wave generator, in N·m.
-    pub input_torque_nm: f64,
-    /// Torque at the carrier, in N·m.
-    pub output_torque_nm: f64,
-    /// The contact that limits the torque. With `turns_past_teeth`, the contact nearest to its allowable stress.
-    pub limited_by: ContactName,
-    /// True if no contact reaches its stress: at a larger torque the wave generator would rotate past the teeth. Left
-    /// out if false.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub turns_past_teeth: bool,
-    /// Input angle of the limit, in deg.
-    pub input_angle_deg: f64,
-}
-
 impl WindUpAnswer {
     pub(super) fn new(drive: &Drive, sweep: &solver::Sweep, unloaded_wind_up_deg: Option<Vec<f64>>) -> Self {
         let unloaded_peak_to_peak_deg = unloaded_wind_up_deg.as_ref().map(|column| {
@@ -225,14 +194,7 @@ impl WindUpAnswer {
     }
 }
 
-impl From<TorqueCapacity> for TorqueCapacityAnswer {
-    fn from(capacity: TorqueCapacity) -> Self {
-        let TorqueCapacity { input_torque_nm, output_torque_nm, contact, turns_past_teeth, input_angle_deg } = capacity;
-        Self { input_torque_nm, output_torque_nm, limited_by: contact.into(), turns_past_teeth, input_angle_deg }
-    }
-}
-
-/// Residuals of conditions that the results must meet.
+/// How well the results fulfil what must hold.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ChecksAnswer {
     /// Largest relative deviation of the input, ring and carrier torques from equilibrium, over the input angles.
@@ -270,14 +232,8 @@ impl From<ContactPeaks> for ContactPeaksAnswer {
             half_length_mm,
             shear_stress_mpa: shear.map(|shear| shear.stress_mpa),
             shear_depth_mm: shear.map(|shear| shear.depth_mm),
-            force_n: force_n.into(),
-            stress_mpa: stress_mpa.into(),
+            force_n,
+            stress_mpa,
         }
-    }
-}
-
-impl From<PerContact<ContactPeaks>> for PeaksAnswer {
-    fn from(peaks: PerContact<ContactPeaks>) -> Self {
-        Self { wave_generator: peaks.wave_generator.into(), ring: peaks.ring.into(), carrier: peaks.carrier.into() }
     }
 }

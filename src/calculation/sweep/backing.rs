@@ -4,19 +4,18 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 use toothwave_solver::backing::{Backing, Backings, Estimate, Shares};
-use toothwave_solver::{Drive, LoadCase};
+use toothwave_solver::{Contact, Drive, LoadCase};
 use utoipa::ToSchema;
 
 use crate::json::word;
-use crate::sweep::contact::ContactName;
 
 /// An estimate of what gives way behind a contact (docs/explanation/theory.md section 4.10).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct EstimateAnswer {
     /// The contact.
-    pub contact: ContactName,
+    pub contact: Contact,
     /// What gives way behind it.
-    pub backing: BackingWord,
+    pub backing: Backing,
     /// How far the contact gives way besides, for each newton there, beyond the depth that its law counts to.
     pub compliance_mm_per_n: f64,
     /// Whether the parts are held so as far as `parts` says; where it says nothing, as the stiffer of the two.
@@ -28,34 +27,6 @@ pub struct EstimateAnswer {
     pub share: Option<f64>,
 }
 
-/// What gives way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum BackingWord {
-    /// The wave generator between its contacts and its bore.
-    CamOnBore,
-    /// The ring's rim in a rigid housing.
-    HousedRim,
-    /// The rim with nothing around it.
-    FreeRim,
-    /// A finger of the carrier held at both ends.
-    FingerAtBothEnds,
-    /// A finger held at one end.
-    FingerAtOneEnd,
-}
-
-impl From<Backing> for BackingWord {
-    fn from(backing: Backing) -> Self {
-        match backing {
-            Backing::CamOnBore => Self::CamOnBore,
-            Backing::HousedRim => Self::HousedRim,
-            Backing::FreeRim => Self::FreeRim,
-            Backing::FingerAtBothEnds => Self::FingerAtBothEnds,
-            Backing::FingerAtOneEnd => Self::FingerAtOneEnd,
-        }
-    }
-}
-
 impl EstimateAnswer {
     pub(super) fn all(backings: &Backings, drive: &Drive, load: &LoadCase, shares: Option<&Shares>) -> Vec<Self> {
         let share_of = |wanted: Backing| {
@@ -63,13 +34,13 @@ impl EstimateAnswer {
             shares.into_iter().find(|(estimate, _)| estimate.backing == wanted).map(|&(_, share)| share)
         };
         let answer = |Estimate { backing, compliance_mm_per_n }: Estimate| Self {
-            contact: backing.contact().into(),
-            backing: backing.into(),
+            contact: backing.contact(),
+            backing,
             compliance_mm_per_n,
             is_as_held: backing.is_of(backings.support()),
             share: share_of(backing),
         };
-        backings.estimates(drive, load).into_iter().map(answer).collect()
+        backings.estimates(drive, load.parameters()).into_iter().map(answer).collect()
     }
 }
 

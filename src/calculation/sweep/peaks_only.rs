@@ -1,6 +1,5 @@
 //! A sweep without its columns: the answer of a batch with `peaks_only`.
 
-use crate::coincidence_degree::TeethInMeshAnswer;
 use crate::design::{Design, ModelDocument};
 use crate::findings::FindingAnswer;
 use crate::forms::{Form, Format, Forms};
@@ -8,11 +7,12 @@ use crate::key::Encode;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, Stop};
 use crate::sweep::Sweep;
-use crate::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
+use crate::sweep::answer::{
+    ChecksAnswer, ContactPeaksAnswer, LoadAnswer, ModelError, PerContact, SweepAnswer, TeethInMesh, TorqueCapacity,
+};
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::DutyAnswer;
-use crate::sweep::losses::LossTotalsAnswer;
-use crate::sweep::model_error::ModelErrorAnswer;
+use crate::sweep::losses::LossTotals;
 use serde::{Serialize, Serializer};
 
 /// The question for a sweep without columns.
@@ -33,18 +33,18 @@ struct View<'a> {
     sweep_period_deg: Option<f64>,
     load: &'a LoadAnswer,
     enters_under_load: bool,
-    peaks: &'a PeaksAnswer,
+    peaks: &'a PerContact<ContactPeaksAnswer>,
     model: &'a ModelDocument,
-    model_error: &'a ModelErrorAnswer,
+    model_error: &'a ModelError,
     series_compliance_estimates: &'a [EstimateAnswer],
-    teeth_in_mesh_per_zone: &'a TeethInMeshAnswer,
-    loaded_teeth_per_zone: &'a TeethInMeshAnswer,
+    teeth_in_mesh_per_zone: &'a TeethInMesh,
+    loaded_teeth_per_zone: &'a TeethInMesh,
     #[serde(skip_serializing_if = "Option::is_none")]
-    torque_capacity: &'a Option<TorqueCapacityAnswer>,
+    torque_capacity: &'a Option<TorqueCapacity>,
     #[serde(skip_serializing_if = "Option::is_none")]
     duty: &'a Option<DutyAnswer>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    losses: Option<&'a LossTotalsAnswer>,
+    losses: Option<&'a LossTotals>,
     checks: &'a ChecksAnswer,
     findings: &'a [FindingAnswer],
 }

@@ -10,7 +10,7 @@ use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
 use super::answer::{StatesAnswer, SweepAnswer};
-use super::peak::PeakAnswer;
+use toothwave_solver::sweep::Peak;
 
 /// Apart for readers who do not tell red from green (Okabe and Ito): force, stress.
 const COLORS: [&str; 2] = ["#0072b2", "#d55e00"];
@@ -35,7 +35,7 @@ struct Panel<'a> {
     color: &'static str,
     x: &'a [f64],
     y: &'a [f64],
-    peak: &'a PeakAnswer,
+    peak: &'a Peak,
 }
 
 /// A tooth's pass through the zone, from entry to root: all states by position, and pieces of the places where they stand, each a stretch of these states.
@@ -133,7 +133,7 @@ fn panels(sweep: &SweepAnswer) -> Vec<Panel<'_>> {
             &states.stress_carrier_mpa,
         ),
     ];
-    let titled = |quantity: &str, contact: &str, peak: &PeakAnswer, unit: &str| {
+    let titled = |quantity: &str, contact: &str, peak: &Peak, unit: &str| {
         format!("{quantity}, {contact}: up to {:.1} {unit}", peak.value)
     };
     let forces = contacts.iter().map(|&(contact, x_label, x, peaks, force, _)| Panel {

@@ -114,6 +114,8 @@ const ratio = {
   next: (value, sense) => (value + sense > -2 && value + sense < 2 ? 2 * sense : value + sense),
 };
 
+/** With one lobe a harmonic support is an eccentric. */
+const SUPPORT_LOBES = whole('/drive/wave_generator/lobes', 'Lobes', 'U', { likely: 2, start: (design) => Math.max(2, lobesOf(design)), adjust: withRing });
 const LOBES = whole('/drive/wave_generator/lobes', 'Lobes', 'U', { likely: 2, start: lobesOf, adjust: withRing });
 const AMPLITUDE = number('/drive/wave_generator/amplitude_mm', 'Amplitude', 'e', 'mm', { slider: WIDE, likely: 1, start: (design) => sizeOf(design).stroke });
 const WIDTH = number('/drive/teeth/width_mm', 'Tooth width', 'L_1', 'mm', { slider: WIDE, likely: 15, start: (design) => 3 * (at(design, '/drive/teeth/radius_mm') ?? 5) });
@@ -227,7 +229,7 @@ export const GROUPS = [
           value: 'harmonic',
           label: 'Harmonic support',
           fields: [
-            LOBES,
+            SUPPORT_LOBES,
             number('/drive/wave_generator/mean_radius_mm', 'Mean radius', 'R_0', 'mm', { slider: NARROW, likely: 57, start: (design) => sizeOf(design).mean }),
             AMPLITUDE,
           ],
@@ -415,7 +417,10 @@ export const GROUPS = [
     title: 'Compliance of the supports',
     pointer: '/model/series_compliance_mm_per_n',
     hint: 'Added to the contacts themselves, such as that of a bearing under the cam. Only virtual work takes it.',
-    summary: (design) => (Object.values(at(design, '/model/series_compliance_mm_per_n') ?? {}).some((value) => value) ? 'given' : 'nothing'),
+    summary: (design) => {
+      const series = at(design, '/model/series_compliance_mm_per_n') ?? {};
+      return series === 'estimated' ? series : Object.values(series).some((value) => value) ? 'given' : 'nothing';
+    },
     fields: [
       compliance('wave_generator', 'Compliance, wave generator'), compliance('ring', 'Compliance, ring'), compliance('carrier', 'Compliance, carrier'),
       choice('/model/refinements', 'Refinements', [
@@ -591,7 +596,8 @@ export function at(design, pointer) {
  *  stays as it is. */
 export function changed(design, pointer, value) {
   const [key, ...rest] = keys(pointer);
-  const copy = { ...design };
+  // A value below a word takes the word's place.
+  const copy = typeof design === 'string' ? {} : { ...design };
   const inner = rest.length === 0 ? value : changed(design?.[key] ?? {}, `/${rest.join('/')}`, value);
   const isEmptied = value === undefined && rest.length > 0 && Object.keys(inner).length === 0;
   if (inner === undefined || isEmptied) delete copy[key];

@@ -97,7 +97,7 @@ export class Losses {
       const button = html('button', { type: 'button', 'aria-label': `${name}: use it` }, name);
       const cells = [
         html('data', { class: 'number', value: efficiency.ring_fixed }, percent(efficiency.ring_fixed)),
-        locks.ring_fixed ? 'locks itself' : html('data', { class: 'number', value: efficiency.ring_fixed_back_driven }, percent(efficiency.ring_fixed_back_driven)),
+        locks ? 'locks itself' : html('data', { class: 'number', value: efficiency.ring_fixed_back_driven }, percent(efficiency.ring_fixed_back_driven)),
         hasPower ? html('data', { class: 'number', value: power }, withUnit(number(power, 3), 'W')) : undefined,
         ...PLACES.map(({ key }) => html('data', { class: 'number', value: places[key] }, percent((places[key] / ratio) * (1 - efficiency.ring_fixed)))),
       ];

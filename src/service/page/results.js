@@ -90,13 +90,9 @@ const PLACES = [...CONTACTS.map(({ key, name }) => ({ key, name: key === 'wave_g
 
 const lossRows = [
   percentRow('Efficiency, ring fixed', 'η', ({ efficiency }) => efficiency.ring_fixed, { significant: 4 }),
-  percentRow('Efficiency, carrier fixed', 'η', ({ efficiency }) => efficiency.carrier_fixed, { significant: 4 }),
-  percentRow('Efficiency, wave generator fixed', 'η', ({ efficiency }) => efficiency.wave_generator_fixed, { significant: 4 }),
-  ...[['ring_fixed', 'ring fixed'], ['carrier_fixed', 'carrier fixed'], ['wave_generator_fixed', 'wave generator fixed']].map(([key, name]) =>
-    percentRow(`Driven from behind, ${name}`, 'η', ({ efficiency }) => efficiency[`${key}_back_driven`], {
-      text: ({ sweep: { losses } }) => (losses.self_locking[key] ? 'locks itself' : `${number(100 * losses.efficiency[`${key}_back_driven`], 4)} %`),
-    }),
-  ),
+  percentRow('Driven from behind, ring fixed', 'η', ({ efficiency }) => efficiency.ring_fixed_back_driven, {
+    text: ({ sweep: { losses } }) => (losses.self_locking ? 'locks itself' : `${number(100 * losses.efficiency.ring_fixed_back_driven, 4)} %`),
+  }),
   percentRow('The efficiency may be off by', '', ({ efficiency_error: error }) => error, { significant: 2 }),
   lossRow('Input torque with losses, ring fixed', 'M', 'N·m', ({ required_input_torque_nm: torque }) => torque),
   lossRow('Power lost, ring fixed', 'P', 'W', ({ power_loss_w: power }) => power),
@@ -156,7 +152,7 @@ const KEY_ROWS = [
   largestRow('Largest stress', 'stress_mpa', 'MPa'),
   percentRow('Efficiency', '', ({ efficiency }) => efficiency.ring_fixed, {
     significant: 3,
-    note: ({ sweep: { losses } }) => (losses.self_locking.ring_fixed ? 'ring fixed; locks itself' : `ring fixed; ${number(100 * losses.efficiency.ring_fixed_back_driven, 3)} % from behind`),
+    note: ({ sweep: { losses } }) => (losses.self_locking ? 'ring fixed; locks itself' : `ring fixed; ${number(100 * losses.efficiency.ring_fixed_back_driven, 3)} % from behind`),
     isOptional: true,
   }),
   row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {

@@ -31,7 +31,7 @@ impl Ellipse {
         let size = (Parameter::SemiMajor, semi_major_mm);
         Given {
             lobes: 2,
-            are_lobes_given: false,
+            given_lobes: None,
             size,
             shape: (Parameter::SemiMinor, semi_minor_mm),
             stroke: size,

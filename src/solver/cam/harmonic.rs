@@ -30,7 +30,7 @@ impl Harmonic {
         let stroke = (Parameter::Amplitude, amplitude_mm);
         Given {
             lobes,
-            are_lobes_given: true,
+            given_lobes: Some(Parameter::HarmonicLobes),
             size: (Parameter::MeanRadius, mean_radius_mm),
             shape: stroke,
             stroke,
@@ -43,7 +43,7 @@ impl Harmonic {
     pub(super) const fn eccentric(radius_mm: f64, eccentricity_mm: f64) -> Given {
         let stroke = (Parameter::Eccentricity, eccentricity_mm);
         let size = (Parameter::EccentricRadius, radius_mm);
-        Given { are_lobes_given: false, size, shape: stroke, stroke, ..Self::given(1, radius_mm, eccentricity_mm) }
+        Given { given_lobes: None, size, shape: stroke, stroke, ..Self::given(1, radius_mm, eccentricity_mm) }
     }
 
     /// Returns the lower bound of R0: e, so that the axis is inside, and `e(U² - 1)`, so that the lobe is round.

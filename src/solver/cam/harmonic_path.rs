@@ -25,7 +25,7 @@ impl HarmonicPath {
         let stroke = (Parameter::Amplitude, amplitude_mm);
         Given {
             lobes,
-            are_lobes_given: true,
+            given_lobes: Some(Parameter::Lobes),
             size: (Parameter::MeanPathRadius, mean_radius_mm),
             shape: stroke,
             stroke,

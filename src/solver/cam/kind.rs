@@ -10,9 +10,9 @@ use crate::violation::Parameter;
 /// Parameters of a wave generator, as each kind defines them in its own file.
 pub(super) struct Given {
     pub(super) lobes: i64,
-    /// True if the designer gives the number of lobes, false if the kind fixes it.
-    pub(super) are_lobes_given: bool,
-    /// Parameter that sets the size of the cam.
+    /// What says how many lobes there are; none of a kind that has its own number.
+    pub(super) given_lobes: Option<Parameter>,
+    /// What says how large the cam is.
     pub(super) size: (Parameter, f64),
     /// Parameter that sets the deviation from a circle.
     pub(super) shape: (Parameter, f64),

@@ -35,7 +35,7 @@ pub enum WaveGenerator {
         /// `e`: distance of its centre from the axis, in mm.
         eccentricity_mm: f64,
     },
-    /// The support function `R0 + e cos Uφ`.
+    /// The support function `R0 + e cos Uφ` of two lobes or more; with one it is an eccentric.
     Harmonic {
         /// `U`: number of lobes.
         lobes: i64,
@@ -98,8 +98,8 @@ impl WaveGenerator {
 
     /// Returns the given values, each with the parameter that defines its range.
     pub fn parameters(&self) -> Vec<(Parameter, f64)> {
-        let Given { lobes, are_lobes_given, size, shape, .. } = self.given();
-        are_lobes_given.then_some((Parameter::Lobes, lobes as f64)).into_iter().chain([size, shape]).collect()
+        let Given { lobes, given_lobes, size, shape, .. } = self.given();
+        given_lobes.map(|parameter| (parameter, lobes as f64)).into_iter().chain([size, shape]).collect()
     }
 
     /// Returns the parameters that set the size of the cam and its deviation from a circle.
@@ -120,9 +120,9 @@ impl WaveGenerator {
         if is_path { mean_radius_mm - tooth_radius_mm } else { mean_radius_mm }
     }
 
-    /// Returns true if the cam is an eccentric circle: an eccentric, or a harmonic support with one lobe.
+    /// Whether the cam is a circle off the axis.
     pub const fn is_eccentric_circle(&self) -> bool {
-        matches!(self, Self::Eccentric { .. } | Self::Harmonic { lobes: 1, .. })
+        matches!(self, Self::Eccentric { .. })
     }
 
     /// Returns the parameter that sets the stroke of the teeth. For an ellipse it is the semi-major axis, the other

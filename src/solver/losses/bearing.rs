@@ -6,13 +6,54 @@ use nalgebra::Vector2;
 
 use crate::losses::{LoadedTooth, Mechanism};
 
-/// What rolls in a bearing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// What rolls in a bearing: its life falls with the third power of the load with balls, with the power 10/3 with rollers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
 pub enum RollingElement {
-    /// Balls: life falls with the third power of the load.
+    /// Balls.
+    #[default]
     Ball,
-    /// Rollers: with the power 10/3.
+    /// Rollers.
     Roller,
+}
+
+/// The bearing that is the eccentric.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BearingRating {
+    /// Its dynamic load rating C.
+    pub dynamic_load_rating_n: f64,
+    /// What rolls in it.
+    pub element: RollingElement,
+}
+
+/// Load and basic rating life (ISO 281, 90 % reliability, no factor for lubrication) of the bearing that is the eccentric.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+pub struct BearingLife {
+    /// The constant radial load under which it would last as long.
+    pub mean_load_n: f64,
+    /// Millions of revolutions of one of its rings against the other.
+    pub life_million_revolutions: f64,
+    /// How fast they turn against each other, ring of the drive fixed, given a speed.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    pub speed_rpm: Option<f64>,
+    /// The life in hours, given a speed.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    pub life_h: Option<f64>,
+}
+
+impl BearingRating {
+    /// How long it lasts under a mean load, in hours where its rings turn at a known speed.
+    pub fn life(&self, mean_load_n: f64, speed_rpm: Option<f64>) -> BearingLife {
+        let life_h = |speed_rpm| self.element.life_h(self.dynamic_load_rating_n, mean_load_n, speed_rpm);
+        BearingLife {
+            mean_load_n,
+            life_million_revolutions: 60.0 * 1e-6 * life_h(1.0),
+            speed_rpm,
+            life_h: speed_rpm.map(life_h),
+        }
+    }
 }
 
 /// A load that a bearing bears for some of its turns.

@@ -6,9 +6,8 @@ use crate::drive::Drive;
 use crate::gaps::{Deviations, Gaps};
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::losses::bearing::{LoadForRevolutions, RollingElement};
-use crate::losses::duty::{ColumnForTime, mean_at_each_place};
-use crate::losses::wear::WearParameters;
-use crate::losses::{AtInputAngle, Friction, LoadedTooth, Mechanism, ToothSlip, mean_over_period};
+use crate::losses::wear::{WearParameters, WornPlace};
+use crate::losses::{AtInputAngle, Friction, LoadedTooth, Mechanism, ToothSlip, Turning, mean_over_period};
 use crate::mesh::PlacedTooth;
 use crate::position::{Position, half_lobe_rad};
 use crate::ring::{FlankPoint, TipCorner};
@@ -18,19 +17,45 @@ use crate::sweep::mean::means;
 use crate::sweep::{Peak, States, Sweep};
 use crate::{SolveError, Stop};
 
-/// The loss ratio ν, by where the power goes.
+/// A loss ratio or a power, by where it is lost.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LossRatio {
-    /// At the contacts.
-    pub contacts: PerContact<f64>,
-    /// In the bearing between cam and race.
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+pub struct LossByPlace {
+    /// Between teeth and wave generator, or its race.
+    pub wave_generator: f64,
+    /// Between teeth and ring.
+    pub ring: f64,
+    /// Between teeth and carrier.
+    pub carrier: f64,
+    /// In the bearing between cam and race; 0 of a plain cam.
     pub bearing: f64,
 }
 
-impl LossRatio {
-    /// ν altogether.
+impl LossByPlace {
+    const PLACES: [fn(&Self) -> f64; 4] =
+        [|loss| loss.wave_generator, |loss| loss.ring, |loss| loss.carrier, |loss| loss.bearing];
+
+    /// In the order of the fields.
+    const fn new([wave_generator, ring, carrier, bearing]: [f64; 4]) -> Self {
+        Self { wave_generator, ring, carrier, bearing }
+    }
+
+    /// The same quantity of each place.
+    pub(super) fn of(quantity: impl FnMut(fn(&Self) -> f64) -> f64) -> Self {
+        Self::new(Self::PLACES.map(quantity))
+    }
+
+    /// What friction does over a torque.
+    fn of_turning(turning: &Turning, input_torque_nmm: f64) -> Self {
+        let PerContact { wave_generator, ring, carrier } = turning.work_nmm_per_rad;
+        let work_nmm_per_rad = [wave_generator, ring, carrier, turning.bearing_work_nmm_per_rad];
+        Self::new(work_nmm_per_rad.map(|work| work / input_torque_nmm))
+    }
+
+    /// Altogether.
     pub fn total(&self) -> f64 {
-        self.contacts.iter().map(|(_, &ratio)| ratio).sum::<f64>() + self.bearing
+        let Self { wave_generator, ring, carrier, bearing } = self;
+        wave_generator + ring + carrier + bearing
     }
 }
 
@@ -38,7 +63,7 @@ impl LossRatio {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Losses {
     /// Mean loss ratio over the period.
-    pub mean: LossRatio,
+    pub mean: LossByPlace,
     /// The loss ratio at each input angle of the sweep.
     pub loss_ratio: Vec<f64>,
     /// `v_c`, one entry a state of the sweep; at a race against the race.
@@ -80,12 +105,7 @@ impl Losses {
         at_each_input_angle(drive, states, stop, |input_angle_deg, teeth| {
             let teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
             let turning = mechanism.turning(friction, &teeth);
-            let over_torque = |work_nmm_per_rad: f64| work_nmm_per_rad / input_torque_nmm;
-            let ratio = LossRatio {
-                contacts: PerContact::of(|contact| over_torque(*turning.work_nmm_per_rad.get(contact))),
-                bearing: over_torque(turning.bearing_work_nmm_per_rad),
-            };
-            ratios.push((input_angle_deg, ratio));
+            ratios.push((input_angle_deg, LossByPlace::of_turning(&turning, input_torque_nmm)));
             race_mm_per_rad.push(turning.race_mm_per_rad);
             for slip in &turning.teeth {
                 for (contact, &slip) in slip.slip_mm_per_rad.iter() {
@@ -95,7 +115,7 @@ impl Losses {
             }
             Ok(())
         })?;
-        let mean = |of: &dyn Fn(&LossRatio) -> f64| {
+        let mean = |of: fn(&LossByPlace) -> f64| {
             let column: Vec<_> = ratios
                 .iter()
                 .map(|(input_angle, ratio)| AtInputAngle { input_angle: *input_angle, value: of(ratio) })
@@ -103,10 +123,7 @@ impl Losses {
             mean_over_period(&column)
         };
         Ok(Self {
-            mean: LossRatio {
-                contacts: PerContact::of(|contact| mean(&|ratio| *ratio.contacts.get(contact))),
-                bearing: mean(&|ratio| ratio.bearing),
-            },
+            mean: LossByPlace::of(mean),
             loss_ratio: ratios.iter().map(|(_, ratio)| ratio.total()).collect(),
             slip_mm_per_rad,
             rolls,
@@ -147,17 +164,16 @@ impl Losses {
                         ..LoadedTooth::new(*lobe, &tooth.center, &tooth.flank, force_n)
                     });
                 }
-                let turning = mechanism.turning(friction, &listed);
-                let PerContact { wave_generator, ring, carrier } = turning.work_nmm_per_rad;
-                Ok([wave_generator, ring, carrier, turning.bearing_work_nmm_per_rad]
-                    .map(|work| work / input_torque_nmm))
+                let LossByPlace { wave_generator, ring, carrier, bearing } =
+                    LossByPlace::of_turning(&mechanism.turning(friction, &listed), input_torque_nmm);
+                Ok([wave_generator, ring, carrier, bearing])
             };
-        let [wave_generator, ring, carrier, bearing] = means(&loaded, tolerance, work_over_torque, stop)?;
-        Ok(Self { mean: LossRatio { contacts: PerContact { wave_generator, ring, carrier }, bearing }, ..self })
+        let mean = LossByPlace::new(means(&loaded, tolerance, work_over_torque, stop)?);
+        Ok(Self { mean, ..self })
     }
 
-    /// The largest `p·v` of each contact over the states of the sweep that these losses belong to, at a turning of the wave generator
-    /// against the carrier; see [`pressure_velocity_mpa_m_per_s`](super::pressure_velocity_mpa_m_per_s).
+    /// The largest `p·v = σ |v_c|` of each contact over the states of the sweep that these losses belong to, at a turning of the wave generator against the
+    /// carrier, σ the largest Hertz pressure. Handbook limits are on the load over the projected area, which is far less: the two are never compared.
     pub fn pressure_velocity_peaks(&self, sweep: &Sweep, turning_rad_per_s: f64) -> PerContact<Peak> {
         let states = &sweep.states;
         PerContact::of(|contact| {
@@ -231,28 +247,24 @@ impl Wear {
     /// The mean over a duty of at least one point, each with its share of the time and swept over the same input angles: at each place, since
     /// depths add where they are.
     pub fn over_duty(points: &[WearForTime<'_>]) -> Self {
-        let mm_per_hour = PerContact::of(|contact| {
-            let columns: Vec<_> = points
-                .iter()
-                .map(|WearForTime { share_of_time, wear }| ColumnForTime {
-                    share_of_time: *share_of_time,
-                    column: wear.mm_per_hour.get(contact),
-                })
-                .collect();
-            mean_at_each_place(&columns)
-        });
-        // A race is one place.
-        let of_race: Option<Vec<_>> =
-            points.iter().map(|point| point.wear.race_mm_per_hour.map(|depth| [depth])).collect();
-        let race_mm_per_hour = of_race.and_then(|depths| {
-            let columns: Vec<_> = points
-                .iter()
-                .zip(&depths)
-                .map(|(point, column)| ColumnForTime { share_of_time: point.share_of_time, column })
-                .collect();
-            mean_at_each_place(&columns).first().copied()
-        });
-        Self { mm_per_hour, race_mm_per_hour }
+        let time: f64 = points.iter().map(|point| point.share_of_time).sum();
+        let mean = |of: &dyn for<'a> Fn(&'a Self) -> &'a [f64]| -> Vec<f64> {
+            let at = |place: usize| points.iter().map(|point| point.share_of_time * of(point.wear)[place]).sum::<f64>();
+            let places = points.first().map_or(0, |point| of(point.wear).len());
+            (0..places).map(|place| at(place) / time).collect()
+        };
+        Self {
+            mm_per_hour: PerContact::of(|contact| mean(&|wear| wear.mm_per_hour.get(contact))),
+            // A race is one place.
+            race_mm_per_hour: mean(&|wear| wear.race_mm_per_hour.as_slice()).first().copied(),
+        }
+    }
+
+    /// Where each part wears most; none without states.
+    pub(super) fn largest(&self, states: &States) -> Option<PerContact<WornPlace>> {
+        let peaks = self.peaks(states);
+        let of_race = self.race_mm_per_hour.map(|value| WornPlace { value, input_angle_deg: None, position_deg: None });
+        PerContact::try_of(|contact| peaks.get(contact).map(WornPlace::from).or(of_race).ok_or(())).ok()
     }
 
     /// The largest depth of each part and where it is; none of a race.

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use crate::contact::{Contact, PerContact};
 use crate::losses::{Friction, LoadedTooth, Mechanism, ToothSlip, secant};
+use crate::sweep::Peak;
 
 /// Seconds in an hour.
 const SECONDS: f64 = 3600.0;
@@ -15,6 +16,26 @@ pub struct WearParameters {
     pub rate_mm3_per_nm: PerContact<f64>,
     /// `|ω_HS|`.
     pub turning_rad_per_s: f64,
+}
+
+/// How fast a part wears by Archard's law where it wears most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+pub struct WornPlace {
+    /// The depth, in mm an hour.
+    pub value: f64,
+    /// Input angle at which a tooth touches the part there; a race wears all round and has no place.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    pub input_angle_deg: Option<f64>,
+    /// Position of that tooth, from the middle of its lobe.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    pub position_deg: Option<f64>,
+}
+
+impl From<Peak> for WornPlace {
+    fn from(Peak { value, input_angle_deg, position_deg }: Peak) -> Self {
+        Self { value, input_angle_deg: Some(input_angle_deg), position_deg: Some(position_deg) }
+    }
 }
 
 impl Mechanism {

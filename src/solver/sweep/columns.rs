@@ -90,12 +90,13 @@ pub struct InputAngles {
 
 /// Largest value of a column, and the state in which it occurs.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct Peak {
-    /// Value, in the column's unit.
+    /// The value, in the unit of the field that holds the peak.
     pub value: f64,
     /// Input angle of the state.
     pub input_angle_deg: f64,
-    /// Position of the tooth.
+    /// Position of the tooth, from the middle of its lobe.
     pub position_deg: f64,
 }
 
@@ -176,16 +177,20 @@ pub struct PeakShear {
 
 /// Torque capacity and the contact that limits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct TorqueCapacity {
     /// Largest torque at the wave generator under which no contact exceeds its allowable stress, in N·m.
     pub input_torque_nm: f64,
     /// The corresponding torque at the carrier, in N·m.
     pub output_torque_nm: f64,
-    /// The contact that limits the torque, or the nearest to its allowable stress if none reaches it.
+    /// The contact that limits it; where `turns_past_teeth`, the one that is nearest to its allowable stress.
+    #[cfg_attr(feature = "document", serde(rename = "limited_by"))]
     pub contact: Contact,
-    /// True if no contact reaches its stress before the wave generator rotates past its teeth.
+    /// Whether no contact reaches its stress under any torque that the teeth carry: the wave generator moves on, and beyond this torque would turn past them.
+    /// Left out where it does not.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "std::ops::Not::not"))]
     pub turns_past_teeth: bool,
-    /// Input angle of the limit, in deg.
+    /// The input angle where it is so.
     pub input_angle_deg: f64,
 }
 
