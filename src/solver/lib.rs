@@ -34,6 +34,7 @@
 
 pub mod approach;
 pub mod backing;
+pub mod backlash;
 pub mod cam;
 pub mod contact;
 pub mod drawing;

@@ -2,6 +2,7 @@
 #![allow(clippy::float_cmp, clippy::unwrap_used, reason = "tests compare exactly where values are exact")]
 
 mod backing;
+mod backlash;
 mod contacts;
 mod corners;
 mod deviations;

@@ -1,0 +1,385 @@
+//! Backlash at the output: how far the carrier turns from one flank to the other, wave generator and ring held, without
+//! load (docs/explanation/theory.md section 4.11).
+
+use crate::cam::ToothCenter;
+use crate::contact::PerContact;
+use crate::drive::Drive;
+use crate::gaps::{Deviations, Gaps, Modification, Runout};
+use crate::load_sharing::LoadCase;
+use crate::mesh::{Mesh, Neighbours, Place};
+use crate::ring::FlankPoint;
+use crate::root::NotConverged;
+use crate::{SolveError, Stop};
+
+mod first;
+mod pair;
+
+use first::FirstTeeth;
+use pair::Pair;
+
+/// What of a lap is left out at either end of a piece: there a tooth stands on a lobe or in a valley, where it has no
+/// arm, and limits are taken.
+const MARGIN: f64 = 1e-9;
+
+/// Intervals of a piece, an even number: two make a cell.
+const INTERVALS: usize = 32;
+
+/// The backlash over the input angle, at the carrier.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Backlash {
+    /// Its mean.
+    pub mean_rad: f64,
+    /// Its least value; below zero parts interfere.
+    pub smallest: BacklashAt,
+    /// Its largest value.
+    pub largest: BacklashAt,
+    /// What the gaps of each contact contribute to the mean; they add up to it.
+    pub contribution_rad: PerContact<f64>,
+}
+
+/// The backlash at an input angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BacklashAt {
+    /// At the carrier.
+    pub backlash_rad: f64,
+    /// Where.
+    pub input_angle_deg: f64,
+}
+
+/// The backlash of a drive with the gaps of this load, which itself counts for nothing, and these deviations.
+///
+/// ```
+/// use toothwave_solver::{backlash, Compatibility, ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Material};
+/// use toothwave_solver::{Materials, Modification, Never, PerContact, ToothShape, Torque, WaveGenerator, parts::CarrierRadii};
+///
+/// let drive = Drive::new(&DriveParameters {
+///     wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
+///     teeth: 28,
+///     installed: 28,
+///     ring_teeth: 26,
+///     tooth_radius_mm: 5.0,
+///     tooth: ToothShape::Cylinder { width_mm: 15.0 },
+///     tip_radius_mm: None,
+/// })
+/// .unwrap();
+/// let steel = Material::STEEL;
+/// let load = LoadCase::new(&LoadParameters {
+///     materials: Materials { wave_generator: steel, teeth: steel, ring: steel, carrier: steel },
+///     torque: Torque::Input(20.0),
+///     compatibility: Compatibility::VirtualWork,
+///     law: ContactLaw::Palmgren,
+///     series_compliance_mm_per_n: PerContact::default(),
+///     ring_teeth_bend: false,
+///     wave_generator_moves: false,
+///     corner_contact: false,
+///     clearance_um: PerContact { wave_generator: 10.0, ring: 10.0, carrier: 10.0 },
+///     modification: Modification::NONE,
+///     carrier: CarrierRadii::default(),
+///     allowable_stress_mpa: None,
+/// })
+/// .unwrap();
+/// let backlash = backlash::of(&drive, &load, &Deviations::default(), &Never).unwrap();
+/// let mean_arcmin = 60.0 * backlash.mean_rad.to_degrees();
+/// assert!((mean_arcmin - 6.266).abs() < 5e-4);
+/// ```
+///
+/// # Errors
+/// [`SolveError::NoToothInMesh`] where at some input angle no flank is touched, [`SolveError::Interference`] where a
+/// tooth cannot pass a lobe or a valley, [`SolveError::Impossible`] for deviations or a modification that the drive
+/// cannot have.
+pub fn of(drive: &Drive, load: &LoadCase, deviations: &Deviations, stop: &dyn Stop) -> Result<Backlash, SolveError> {
+    let mirrored = mirrored(deviations);
+    let flanks = Flanks::new(drive, load, deviations, &mirrored)?;
+    let pieces = flanks.pieces()?;
+    let mut found = Found::new();
+    for lap in 0..flanks.laps {
+        if stop.stopped() {
+            return Err(SolveError::Stopped);
+        }
+        flanks.look(lap, &pieces, &mut found)?;
+    }
+    let laps = flanks.laps as f64;
+    let contribution_rad = PerContact::of(|contact| *found.integral_rad.get(contact) / laps);
+    let at = |(laps_passed, backlash_rad): (f64, f64)| BacklashAt {
+        backlash_rad,
+        input_angle_deg: laps_passed * flanks.lap_deg(),
+    };
+    Ok(Backlash {
+        mean_rad: sum(&contribution_rad),
+        smallest: at(found.smallest),
+        largest: at(found.largest),
+        contribution_rad,
+    })
+}
+
+/// What the gaps of each contact contribute to the backlash at an input angle; together they are the backlash there.
+///
+/// # Errors
+/// As [`of`], but for interference.
+pub fn at(
+    drive: &Drive,
+    load: &LoadCase,
+    deviations: &Deviations,
+    input_angle_deg: f64,
+) -> Result<PerContact<f64>, SolveError> {
+    let mirrored = mirrored(deviations);
+    let flanks = Flanks::new(drive, load, deviations, &mirrored)?;
+    let laps_passed = (input_angle_deg / flanks.lap_deg()).rem_euclid(flanks.laps as f64);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, far below 2^53")]
+    let lap = (laps_passed as u64).min(flanks.laps - 1);
+    let fraction = (laps_passed - lap as f64).clamp(MARGIN, 1.0 - MARGIN);
+    let first = |side: Side| -> Result<_, SolveError> {
+        let mut first: Option<PerContact<f64>> = None;
+        let fraction = side.fraction(fraction);
+        for tooth in flanks.teeth(side.lap(lap, flanks.laps), flanks.places(fraction)) {
+            let closing_rad = flanks.closing_rad(side, &tooth, &flanks.lever(tooth.spacings, fraction)?);
+            if first.is_none_or(|first| sum(&closing_rad) < sum(&first)) {
+                first = Some(closing_rad);
+            }
+        }
+        first.ok_or(SolveError::NoLeverArm)
+    };
+    let (front, behind) = (first(Side::Front)?, first(Side::Behind)?);
+    Ok(PerContact::of(|contact| front.get(contact) + behind.get(contact)))
+}
+
+fn sum(of_contacts: &PerContact<f64>) -> f64 {
+    of_contacts.iter().map(|(_, value)| value).sum()
+}
+
+/// The deviations of the mirrored drive, of which the teeth in front are those behind the lobes of this one.
+fn mirrored(deviations: &Deviations) -> Deviations {
+    let list = |list: &[f64], sign: f64| {
+        let turned = list.iter().take(1).chain(list.iter().skip(1).rev());
+        turned.map(|value| sign * value).collect::<Vec<_>>()
+    };
+    let runout = |runout: &Runout| Runout { angle_deg: -runout.angle_deg, ..*runout };
+    Deviations {
+        tooth_radius_um: list(&deviations.tooth_radius_um, 1.0),
+        slot_angle_arcsec: list(&deviations.slot_angle_arcsec, -1.0),
+        slot_wall_um: list(&deviations.slot_wall_um, 1.0),
+        ring_space_um: list(&deviations.ring_space_um, 1.0),
+        ring_space_angle_arcsec: list(&deviations.ring_space_angle_arcsec, -1.0),
+        wave_generator_lobe_um: list(&deviations.wave_generator_lobe_um, 1.0),
+        runout: PerContact::of(|contact| runout(deviations.runout.get(contact))),
+    }
+}
+
+/// The flanks on either side of the lobes.
+#[derive(Debug, Clone, Copy)]
+enum Side {
+    /// Those that carry where the load holds the wave generator back.
+    Front,
+    /// The others, which are the front ones of the mirrored drive at the whole repeat less the input angle.
+    Behind,
+}
+
+impl Side {
+    fn fraction(self, fraction: f64) -> f64 {
+        match self {
+            Self::Front => fraction,
+            Self::Behind => 1.0 - fraction,
+        }
+    }
+
+    const fn lap(self, lap: u64, laps: u64) -> u64 {
+        match self {
+            Self::Front => lap,
+            Self::Behind => laps - 1 - lap,
+        }
+    }
+
+    /// One of so many things in a row.
+    const fn index(self, index: usize, count: usize) -> usize {
+        match self {
+            Self::Front => index,
+            Self::Behind => count - 1 - index,
+        }
+    }
+}
+
+/// A tooth on one side during a lap.
+#[derive(Debug, Clone, Copy)]
+struct Tooth {
+    /// Spacings from its lobe at the start of the lap.
+    spacings: u64,
+    place: Place,
+}
+
+/// What a gap at each contact of a tooth closes by, and where the tooth stands.
+#[derive(Debug, Clone, Copy)]
+struct Lever {
+    center: ToothCenter,
+    flank: FlankPoint,
+    /// Turn of the carrier for each mm.
+    rad_per_mm: PerContact<f64>,
+}
+
+/// A stretch of every lap in which no tooth enters or leaves.
+struct Piece {
+    nodes: Vec<f64>,
+    /// Of each node the levers, by spacings from 1 on.
+    levers: Vec<Vec<Lever>>,
+}
+
+/// What was seen so far.
+struct Found {
+    integral_rad: PerContact<f64>,
+    /// Laps passed, and the backlash there.
+    smallest: (f64, f64),
+    largest: (f64, f64),
+}
+
+impl Found {
+    fn new() -> Self {
+        Self { integral_rad: PerContact::default(), smallest: (0.0, f64::INFINITY), largest: (0.0, f64::NEG_INFINITY) }
+    }
+
+    fn see(&mut self, laps_passed: f64, backlash_rad: f64) {
+        if backlash_rad < self.smallest.1 {
+            self.smallest = (laps_passed, backlash_rad);
+        }
+        if backlash_rad > self.largest.1 {
+            self.largest = (laps_passed, backlash_rad);
+        }
+    }
+}
+
+/// The flanks of a drive on both sides of its lobes.
+struct Flanks<'a> {
+    drive: &'a Drive,
+    mesh: Mesh,
+    laps: u64,
+    front: Gaps<'a>,
+    /// Of the mirrored drive.
+    behind: Gaps<'a>,
+}
+
+impl<'a> Flanks<'a> {
+    fn new(
+        drive: &'a Drive,
+        load: &LoadCase,
+        deviations: &'a Deviations,
+        mirrored: &'a Deviations,
+    ) -> Result<Self, SolveError> {
+        let p = load.parameters();
+        let mut violations = p.deviation_violations(drive.parameters(), deviations);
+        violations.extend(p.modification.violation_in(drive));
+        if !violations.is_empty() {
+            return Err(SolveError::Impossible(violations));
+        }
+        let mesh = deviations.mesh(drive);
+        if !mesh.always_carries() {
+            return Err(SolveError::NoToothInMesh {
+                engagement_start_deg: drive.flank_limit().position.from_lobe_deg(),
+                spacing_deg: mesh.spacing_deg(),
+            });
+        }
+        let of_mirrored =
+            Modification { carrier_rotation_arcsec: -p.modification.carrier_rotation_arcsec, ..p.modification };
+        Ok(Self {
+            drive,
+            mesh,
+            // Where all items are alike so are all laps.
+            laps: if mesh.tells_items_apart() { mesh.laps() } else { 1 },
+            front: Gaps::new(drive, &p.clearance_um, p.modification, Some(deviations)),
+            behind: Gaps::new(drive, &p.clearance_um, of_mirrored, Some(mirrored)),
+        })
+    }
+
+    fn lap_deg(&self) -> f64 {
+        self.mesh.sweep_period_deg() / self.mesh.laps() as f64
+    }
+
+    /// Spacings from the lobe within which teeth touch the flank.
+    fn places(&self, fraction: f64) -> u64 {
+        self.mesh.whole_spacings() + u64::from(fraction > self.mesh.entry_fraction())
+    }
+
+    /// Those of a side in one of its laps, up to so many spacings from their lobes.
+    fn teeth(&self, lap: u64, places: u64) -> Vec<Tooth> {
+        if !self.mesh.tells_items_apart() {
+            return (1..=places).map(|spacings| Tooth { spacings, place: Place::default() }).collect();
+        }
+        let mut runs = Vec::new();
+        self.mesh.list(places, lap, &mut runs);
+        let apart = self.mesh.laps_of_load_period();
+        let of_run = |run: &Neighbours| {
+            let run = *run;
+            (0..run.count).map(move |tooth| Tooth {
+                spacings: run.first_place + apart * tooth,
+                place: self.mesh.place_of(&run, tooth),
+            })
+        };
+        runs.iter().flat_map(of_run).collect()
+    }
+
+    fn lever(&self, spacings: u64, fraction: f64) -> Result<Lever, NotConverged> {
+        let flank_curve = self.drive.flank();
+        let center = flank_curve.locus().at(self.mesh.position_between(spacings, fraction))?;
+        let flank = flank_curve.at(&center);
+        let (d_mm, k, ratio) = (center.center_radius_mm, flank_curve.teeth_per_wave(), self.drive.teeth_per_wave());
+        let ring_arm_mm = d_mm * flank.tan_pressure_angle * flank.cos_pressure_angle;
+        let rad_per_mm = PerContact {
+            wave_generator: 1.0 / (center.cam_contact.lever_arm_mm * ratio),
+            ring: k / (ring_arm_mm * ratio),
+            carrier: 1.0 / d_mm,
+        };
+        Ok(Lever { center, flank, rad_per_mm })
+    }
+
+    const fn gaps(&self, side: Side) -> &Gaps<'a> {
+        match side {
+            Side::Front => &self.front,
+            Side::Behind => &self.behind,
+        }
+    }
+
+    /// Turn of the carrier by which a tooth closes its gaps, contact by contact.
+    fn closing_rad(&self, side: Side, tooth: &Tooth, lever: &Lever) -> PerContact<f64> {
+        let gap_mm = self.gaps(side).at(&tooth.place, &lever.center, &lever.flank);
+        PerContact::of(|contact| gap_mm.get(contact) * lever.rad_per_mm.get(contact))
+    }
+
+    /// The pieces of a lap, which are those of its mirror image in reverse.
+    fn pieces(&self) -> Result<Vec<Piece>, NotConverged> {
+        let relief = self.front.modification().ring_tip_relief;
+        let relieved = relief.map(|relief| self.mesh.fraction_at_deg(relief.start_deg));
+        let cuts = [Some(self.mesh.entry_fraction()), relieved].into_iter().flatten();
+        let mut ends: Vec<_> = cuts.flat_map(|cut| [cut, 1.0 - cut]).chain([0.0, 1.0]).collect();
+        ends.sort_by(f64::total_cmp);
+        let pieces = ends.windows(2).map(|ends| (ends[0] + MARGIN, ends[1] - MARGIN));
+        pieces.filter(|(start, end)| end - start > 2.0 * MARGIN).map(|(start, end)| self.piece(start, end)).collect()
+    }
+
+    fn piece(&self, start: f64, end: f64) -> Result<Piece, NotConverged> {
+        let places = self.places(start.midpoint(end));
+        let share = |node: usize| node as f64 / INTERVALS as f64;
+        let nodes: Vec<_> = (0..=INTERVALS).map(|node| start * (1.0 - share(node)) + end * share(node)).collect();
+        let levers_at = |&fraction: &f64| (1..=places).map(|spacings| self.lever(spacings, fraction)).collect();
+        let levers = nodes.iter().map(levers_at).collect::<Result<Vec<Vec<_>>, NotConverged>>()?;
+        Ok(Piece { nodes, levers })
+    }
+
+    /// Adds a lap to what was found.
+    fn look(&self, lap: u64, pieces: &[Piece], found: &mut Found) -> Result<(), SolveError> {
+        for (index, Piece { nodes, .. }) in pieces.iter().enumerate() {
+            let on = |side: Side| FirstTeeth::new(self, side, lap, nodes, &pieces[side.index(index, pieces.len())]);
+            let (front, behind) = (on(Side::Front), on(Side::Behind));
+            front.check_lobe_and_valley(lap)?;
+            for cell in (0..INTERVALS).step_by(2) {
+                let those_behind = behind.stretches(cell)?;
+                for ahead in front.stretches(cell)? {
+                    for other in &those_behind {
+                        let (start, end) = (ahead.start.max(other.start), ahead.end.min(other.end));
+                        if start < end {
+                            let teeth = [ahead.tooth, other.tooth];
+                            Pair { front: &front, behind: &behind, teeth, lap }.integrate(start, end, found)?;
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
