@@ -32,6 +32,7 @@
 //! its geometry and its mesh; with a [`LoadCase`] it answers a [`sweep()`](sweep::sweep) over one period.
 
 pub mod approach;
+mod arcs;
 pub mod backing;
 pub mod cam;
 pub mod contact;
@@ -44,6 +45,7 @@ pub mod locus;
 pub mod losses;
 pub mod mesh;
 pub mod model_error;
+mod outline;
 pub mod parts;
 pub mod position;
 pub mod profile;

@@ -15,15 +15,19 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
-    /// An answer to the same document holds it: the path that is asked, and a JSON pointer into the answer.
-    Answer {
-        /// The path.
-        path: &'static str,
-        /// The pointer.
-        pointer: &'static str,
-    },
+    /// An answer to the same document holds it.
+    Answer(AnswerPlace),
     /// It follows from an answer.
     Definition(&'static str),
+}
+
+/// A place in an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+pub struct AnswerPlace {
+    /// The path that is asked.
+    pub path: &'static str,
+    /// A JSON pointer into the answer.
+    pub pointer: &'static str,
 }
 
 /// What has to be known of a variant.
@@ -214,15 +218,15 @@ const fn pressure_velocity(name: &'static str, meaning: &'static str, source: So
 }
 
 const fn geometry(pointer: &'static str) -> Source {
-    Source::Answer { path: "/v1/geometry", pointer }
+    Source::Answer(AnswerPlace { path: "/v1/geometry", pointer })
 }
 
 const fn mesh(pointer: &'static str) -> Source {
-    Source::Answer { path: "/v1/coincidence-degree", pointer }
+    Source::Answer(AnswerPlace { path: "/v1/coincidence-degree", pointer })
 }
 
 const fn sweep(pointer: &'static str) -> Source {
-    Source::Answer { path: "/v1/sweep", pointer }
+    Source::Answer(AnswerPlace { path: "/v1/sweep", pointer })
 }
 
 /// Whoever knows no more than these two knows how large the parts may be, and how many teeth they have.

@@ -20,6 +20,7 @@ use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::convert::converted;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::drawing::preset::Preset;
 use toothwave_calculation::forms::Format;
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::sweep::Sweep;
@@ -56,7 +57,7 @@ enum Command {
     Sweep(Offline),
     /// Each way of computing a design, with its error and its time
     Accuracy(Offline),
-    /// A part, or all of them, as DXF, STEP or SVG
+    /// A part, or all of them, as DXF, STEP, SVG, 3MF or STL
     Draw {
         /// Which part
         #[arg(value_parser = one_of(&PARTS))]
@@ -66,6 +67,9 @@ enum Command {
         /// Form of the answer
         #[arg(long, value_parser = one_of(&FORMATS), default_value = "dxf")]
         format: Format,
+        /// Set each `parts.*.clearance_um` to 50, so that each contact has a gap of 0.1 mm
+        #[arg(long)]
+        printing: bool,
     },
     /// Many designs, one a line, on all cores; answers come as NDJSON in their order
     Batch {
@@ -158,7 +162,10 @@ pub fn run() -> ExitCode {
         Command::CoincidenceDegree(offline) => answer(CoincidenceDegree, &offline.file, offline.format),
         Command::Sweep(offline) => answer(Sweep, &offline.file, offline.format),
         Command::Accuracy(offline) => answer(Accuracy, &offline.file, offline.format),
-        Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
+        Command::Draw { part, file, format, printing } => {
+            let preset = if printing { Preset::Printing } else { Preset::Document };
+            answer(Drawing { part, preset }, &file, format)
+        }
         Command::Batch { file, endpoint, peaks_only } => batch::run(&file, BatchQuery { endpoint, peaks_only }),
         Command::Study { file, format } => study::run(&file, format),
         Command::Convert { file } => convert(&file),

@@ -69,9 +69,9 @@ pub struct StudyResource {
     pub looked_at: u64,
     /// Of those that the result holds, the ones without an answer.
     pub impossible: u64,
-    /// Where the result stands, as far as it has come.
+    /// Where the result stands below the service's address, as far as it has come.
     pub result_href: String,
-    /// Where it tells of its progress.
+    /// Where it tells of its progress, below the service's address.
     pub events_href: String,
     /// Why it broke off.
     #[serde(skip_serializing_if = "Option::is_none")]

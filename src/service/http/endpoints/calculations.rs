@@ -7,6 +7,7 @@ use axum::response::Response;
 use toothwave_calculation::accuracy::{Accuracy, AccuracyAnswer};
 use toothwave_calculation::coincidence_degree::{CoincidenceDegree, CoincidenceDegreeAnswer};
 use toothwave_calculation::design::Design;
+use toothwave_calculation::forms::CsvOptions;
 use toothwave_calculation::geometry::{Geometry, GeometryAnswer};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::SweepAnswer;
@@ -20,7 +21,7 @@ use crate::http::answer::{Problems, respond, respond_uncached};
     path = "/v1/geometry",
     tag = "drive",
     request_body(content = Design, description = "Reads `drive` and `profile`."),
-    params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
+    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
         (status = 200, description = "The geometry.", 
             content((GeometryAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))),
@@ -38,7 +39,7 @@ pub async fn geometry(State(app): State<Arc<App>>, request: Request) -> Response
     path = "/v1/coincidence-degree",
     tag = "drive",
     request_body(content = Design, description = "Reads `drive`."),
-    params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
+    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
         (status = 200, description = "The coincidence degree.", 
             content((CoincidenceDegreeAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))),
@@ -56,7 +57,7 @@ pub async fn coincidence_degree(State(app): State<Arc<App>>, request: Request) -
     path = "/v1/sweep",
     tag = "drive",
     request_body(content = Design, description = "Reads all but `profile`; `load` is required."),
-    params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
+    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
     responses(
         (status = 200, description = "The sweep. As CSV one line a state, with the names of the columns of `states`; as an Apache Arrow stream the same columns; as text a summary; as SVG its plots.",
             content((SweepAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"), (String = "application/vnd.apache.arrow.stream"), (String = "image/svg+xml"))),
@@ -74,6 +75,7 @@ pub async fn sweep(State(app): State<Arc<App>>, request: Request) -> Response {
     path = "/v1/accuracy",
     tag = "drive",
     request_body(content = Design, description = "Reads `drive`, `materials`, `load`, `model` and `accuracy`; `load` is required."),
+    params(CsvOptions),
     responses((status = 200, description = "The ways, each with its error and its time.",
         content((AccuracyAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))), Problems)
 )]
