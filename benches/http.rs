@@ -1,4 +1,4 @@
-//! The whole request: `cargo bench --bench http` writes docs/speed-http.md.
+//! The whole request: `cargo bench --bench http` writes benches/results/speed-http.md.
 //!
 //! The service runs as the released program on one core; this program asks it from another. Beside it, pinned alike, runs the least that
 //! axum can do: a handler that serialises the same answer, and handlers that return the same bytes. With `-- --quick` rounds are short,

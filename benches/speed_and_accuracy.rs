@@ -1,4 +1,4 @@
-//! Speed against error, from real runs: `cargo bench --bench speed_and_accuracy` writes docs/speed-and-accuracy.md with its plots.
+//! Speed against error, from real runs: `cargo bench --bench speed_and_accuracy` writes benches/results/speed-and-accuracy.md with its plots.
 //!
 //! With `-- --quick` everything runs once and small, and the report stays beside the build.
 
@@ -105,9 +105,9 @@ fn introduction(paper: Option<&Paper>) -> String {
 }
 
 const BASELINES: &str = "\
-    - (i) [newton.rs](../benches/baselines/newton.rs): the same formulas with a Newton solve and libm calls at each state.\n\
-    - (ii) [dense.rs](../benches/baselines/dense.rs): the geometry of (i); the paper's 3n equations assembled and solved by nalgebra's LU at each input angle.\n\
-    - (iii) [paper.py](../benches/baselines/paper.py): the paper's method as a plain NumPy script, Newton's method tooth by tooth; and once more with \
+    - (i) [newton.rs](../baselines/newton.rs): the same formulas with a Newton solve and libm calls at each state.\n\
+    - (ii) [dense.rs](../baselines/dense.rs): the geometry of (i); the paper's 3n equations assembled and solved by nalgebra's LU at each input angle.\n\
+    - (iii) [paper.py](../baselines/paper.py): the paper's method as a plain NumPy script, Newton's method tooth by tooth; and once more with \
     all teeth of an input angle in one array, which is the kindest to NumPy.\n\
     - *plain path*: toothwave's own solver state by state, the oracle of the fast path.\n";
 

@@ -1,4 +1,4 @@
-//! Baseline (i): the formulas of docs/theory.md as they stand there, with a Newton solve and libm calls at each state.
+//! Baseline (i): the formulas of docs/explanation/theory.md as they stand there, with a Newton solve and libm calls at each state.
 //!
 //! Angles count from the minor axis: `x = π/2 - ψ` and `χ = π/2 - φ`. A tooth there has no lever arm, and its stress is the square root of
 //! what is left of one: counted from the major axis the stress on the tip is 4e-8 of its peak and not zero.

@@ -7,7 +7,7 @@ use std::process::Command;
 /// How a benchmark was called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Effort {
-    /// The report: written to docs/.
+    /// The report: written to benches/results/.
     Full,
     /// Everything once and small, in less than a minute: shows that the benchmark works, and writes beside the build.
     Quick,
@@ -31,7 +31,7 @@ impl Effort {
     /// Where documents go.
     pub(crate) fn directory(self) -> PathBuf {
         match self {
-            Self::Full => PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs")),
+            Self::Full => PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../benches/results")),
             Self::Quick => PathBuf::from(env!("CARGO_TARGET_TMPDIR")),
         }
     }

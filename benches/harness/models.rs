@@ -203,7 +203,7 @@ const INTRODUCTION: &str = "\n## Every model\n\n\
     parameters to all columns, in ns a state; the rest, from the parameters too, is in µs.\n\n\
     - On an ellipse a state takes five roots and three divisions beside that of its position. `palmgren` adds a root, a division and three roots of ninth and tenth order, each of some 35 operations; \
     balls add two logarithms, each with a division, four cube roots, and the sums for two quantities at wave generator and ring. Columns are 92 bytes of memory a state, which rows without them do not write.\n\
-    - True peaks are looked for alike either way (docs/theory.md section 9); *before* works the moments out tooth by tooth, and the columns with them.\n\
+    - True peaks are looked for alike either way (docs/explanation/theory.md section 9); *before* works the moments out tooth by tooth, and the columns with them.\n\
     - Where slots deviate, the teeth of both zones are told apart over fourteen load periods; in each the positions are the same, and are worked out once.\n\n\
     | | unit | goal | before | now | times |\n|---|---|---|---|---|---|\n";
 

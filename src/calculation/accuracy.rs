@@ -1,4 +1,4 @@
-//! How wrong and how slow each way of computing a design is.
+//! Accuracy: error and time of each computation method.
 
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
@@ -21,86 +21,88 @@ use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 use crate::question::{Limits, Question, checked_drive, checked_load};
 
-/// The sample counts that are tried.
+/// Tested numbers of samples.
 const SAMPLES: [u64; 9] = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 
-/// The tolerances that are tried.
+/// Tested tolerances.
 const TOLERANCES: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
 
-/// Runs of which the median time is taken, at most, and the time after which no further one is begun.
+/// Most timed runs for the median, and the time after which no further run begins.
 const MOST_RUNS: usize = 15;
 const ENOUGH: Duration = Duration::from_millis(2);
 
-/// How wrong and how slow each way of computing a design is, measured for this answer.
+/// Error and time of each computation method, measured for this answer.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AccuracyAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
-    /// The build that computed it: equal builds on equal processors give equal bytes.
+    /// Build of the program. Equal builds on equal processors give equal bytes.
     pub build: &'static str,
-    /// The design's own model, complete: in the place of the document's `model` it asks the same.
+    /// The design's own model with all defaults. As the document's `model` it gives the same answer.
     pub model: ModelDocument,
-    /// The relative error that was asked for.
+    /// Requested relative error.
     pub requested_error: f64,
-    /// The fastest way of the design's own model that meets it; left out where none does.
+    /// The fastest method with the design's own model that meets the requested error. Absent if none does.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub cheapest: Option<WayAnswer>,
-    /// Every way, by model and then from coarse to fine.
+    /// All methods, by model and then from coarse to fine.
     pub ways: Vec<WayAnswer>,
-    /// Models that have no answer for this design.
+    /// Models without an answer for this design.
     pub unavailable: Vec<UnavailableAnswer>,
 }
 
-/// A way of computing the design.
+/// A computation method.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct WayAnswer {
-    /// The form of compatibility.
+    /// Form of compatibility.
     pub compatibility: CompatibilityDocument,
-    /// The contact law.
+    /// Contact law.
     pub law: LawName,
-    /// Equal intervals of the period; left out where there is a tolerance.
+    /// Equal intervals of the period. Absent if there is a tolerance.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub samples: Option<u64>,
-    /// Relative tolerance; left out where there are samples.
+    /// Relative tolerance. Absent if there are samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub tolerance: Option<f64>,
-    /// Largest relative error of the six peaks against those of the same model, converged.
+    /// Largest relative error of the six peaks, compared with the converged peaks of the same model.
     pub error: f64,
-    /// Largest relative difference of the model's converged peaks from those of the design's own model.
+    /// Largest relative difference between the converged peaks of this model and those of the design's own model.
     pub model_difference: f64,
-    /// Largest error of the model's forces that was measured against elastic bodies in drives of this case; left out where none was, or where a sweep's
-    /// `model_error` has other reasons than the law to say that the design is beyond them.
+    /// Largest error of the model's forces that was measured against elastic bodies in similar drives. Absent without
+    /// such a measurement, or if the design is outside the measured range for another reason than the law (see
+    /// `model_error` of a sweep).
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub expected_model_error: Option<f64>,
-    /// Whether `error` is below a tenth of that: a finer way brings digits that the model does not have.
+    /// True if `error` is below a tenth of `expected_model_error`. A finer method gives digits that the model does not
+    /// have.
     pub is_finer_than_model: bool,
-    /// Median time of the solve.
+    /// Median time of the computation.
     pub solve_us: f64,
-    /// States of the sweep.
+    /// Number of states.
     pub states: usize,
 }
 
 /// A model without an answer.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct UnavailableAnswer {
-    /// The form of compatibility.
+    /// Form of compatibility.
     pub compatibility: CompatibilityDocument,
-    /// The contact law.
+    /// Contact law.
     pub law: LawName,
-    /// Why.
+    /// Reason.
     pub code: NoAnswerCode,
 }
 
-/// The checked parameters of the question.
+/// Checked parameters of the question.
 #[derive(Debug)]
 pub struct CheckedAccuracy {
     drive: Drive,
     model: ModelDocument,
-    /// What virtual work is refined by.
+    /// Refinements of virtual work.
     refinements: Refinements,
     load: LoadCase,
     deviations: Deviations,
@@ -109,7 +111,7 @@ pub struct CheckedAccuracy {
     max_states: u64,
 }
 
-/// What is asked.
+/// The question for the accuracy.
 #[derive(Debug)]
 pub struct Accuracy;
 
@@ -163,10 +165,12 @@ impl Question for Accuracy {
         let &CheckedAccuracy { ref drive, ref load, requested_error, .. } = checked;
         let parameters = *load.parameters();
         let own = Converged::new(checked, load, stop).map_err(|error| match error {
-            // There is no field to blame: the reference's tolerance is ours.
+            // No field of the document is wrong, because the reference's tolerance is fixed.
             SolveError::TooManyStates { limit } => NoAnswer::new(
                 NoAnswerCode::TooManyStates,
-                format!("a converged reference for this drive takes more states than the {limit} of `max_states`"),
+                format!(
+                    "a converged reference for this drive needs more than the {limit} states that `max_states` allows"
+                ),
             ),
             error => error.into(),
         })?;
@@ -175,7 +179,7 @@ impl Question for Accuracy {
             let (compatibility, law) = (model.compatibility.into(), model.law.into());
             match Model::new(checked, &model, &own.peaks, stop) {
                 Ok(Some(model)) => model.measure(&mut ways, stop)?,
-                // A gap that this form of compatibility would turn into load.
+                // This form of compatibility would turn a gap into load.
                 Ok(None) => {
                     unavailable.push(UnavailableAnswer { compatibility, law, code: NoAnswerCode::ImpossibleDesign });
                 }
@@ -204,20 +208,20 @@ impl Question for Accuracy {
     }
 }
 
-/// Every number of samples that the limit on states admits.
+/// Returns the numbers of samples within the limit on states.
 fn admitted_samples(mesh: Mesh, max_states: u64) -> impl Iterator<Item = Samples> {
-    // All of them lie within the ranges.
+    // All of them are within the range.
     let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
     samples.filter(move |&samples| mesh.state_count(samples) <= max_states)
 }
 
-/// The design's own model first, then every other form of compatibility with a law that it and the teeth take and that needs no
-/// further numbers.
+/// Returns the design's own model, then every other form of compatibility with each law that is possible for it and the
+/// teeth, and that needs no further numbers.
 fn models(drive: &Drive, own: &LoadParameters, refinements: Refinements) -> Vec<LoadParameters> {
     let laws = match drive.parameters().tooth {
         ToothShape::Ball { .. } => vec![own.law, ContactLaw::Hertz],
         ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => {
-            // With other depths it would be another model under the same name.
+            // Other depths would be another model with the same name.
             let johnson = ContactLaw::Johnson { depth_mm: PerContact::default() };
             let johnson = if matches!(own.law, ContactLaw::Johnson { .. }) { own.law } else { johnson };
             vec![own.law, ContactLaw::Linear, ContactLaw::Palmgren, johnson]
@@ -241,7 +245,7 @@ fn models(drive: &Drive, own: &LoadParameters, refinements: Refinements) -> Vec<
     models
 }
 
-/// A model's converged peaks, and the largest error of its forces that was measured in such drives.
+/// Converged peaks of a model, and the largest error of its forces that was measured in similar drives.
 struct Converged {
     peaks: PerContact<ContactPeaks>,
     expected_error: Option<f64>,
@@ -260,7 +264,7 @@ impl Converged {
     }
 }
 
-/// The largest relative difference of six peaks from their reference.
+/// Returns the largest relative difference of six peaks from their reference.
 fn difference(peaks: &PerContact<ContactPeaks>, reference: &PerContact<ContactPeaks>) -> f64 {
     let pairs = peaks.iter().flat_map(|(contact, peaks)| {
         let reference = reference.get(contact);
@@ -278,7 +282,7 @@ struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// The model, or nothing where its clearances make no sense.
+    /// Makes the model, or none if its clearances are invalid.
     fn new(
         checked: &'a CheckedAccuracy,
         parameters: &LoadParameters,
@@ -294,7 +298,7 @@ impl<'a> Model<'a> {
         Ok(Some(Self { checked, load, reference, difference }))
     }
 
-    /// Tries every number of samples and every tolerance that the limit on states admits.
+    /// Measures every number of samples and every tolerance within the limit on states.
     fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &dyn Stop) -> Result<(), SolveError> {
         let &CheckedAccuracy { ref drive, ref deviations, max_states, .. } = self.checked;
         for samples in admitted_samples(self.load.mesh(drive, deviations), max_states) {
@@ -323,7 +327,7 @@ impl<'a> Model<'a> {
             Points::Samples(samples) => (Some(samples.count()), None),
             Points::Tolerance(tolerance) => (None, Some(tolerance.relative())),
         };
-        /// The share of the model's error below which a numerical one no longer counts.
+        /// Fraction of the model's error below which the numerical error is negligible.
         const FINER: f64 = 0.1;
         let p = self.load.parameters();
         let error = difference(&found.peaks, &self.reference.peaks);
@@ -394,14 +398,14 @@ impl AccuracyAnswer {
         }
         match &self.cheapest {
             Some(way) => {
-                writeln!(writer, "\nfastest of the design's own model within {:e}:", self.requested_error)?;
+                writeln!(writer, "\nfastest method with the design's own model within {:e}:", self.requested_error)?;
                 way.write_line(writer)
             }
-            None => writeln!(writer, "\nno way of the design's own model is within {:e}", self.requested_error),
+            None => writeln!(writer, "\nno method with the design's own model is within {:e}", self.requested_error),
         }?;
         writeln!(
             writer,
-            "\nmodel: its own error against elastic bodies; where an error is below a tenth of that (<), further digits are none of the drive's"
+            "\nmodel: error of the model against elastic bodies. If an error is below a tenth of it (<), further digits are meaningless"
         )
     }
 }

@@ -1,4 +1,4 @@
-//! How many teeth share the load.
+//! Contact ratio (the paper's coincidence degree): how many teeth share the load.
 
 use std::io::{self, Write};
 
@@ -15,37 +15,39 @@ use crate::key::Encode;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, checked_drive};
 
-/// The coincidence degree of a drive, and what it follows from.
+/// Contact ratio of a drive, with the quantities that it depends on.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct CoincidenceDegreeAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
-    /// The build that computed it: equal builds on equal processors give equal bytes.
+    /// Build of the program. Equal builds on equal processors give equal bytes.
     pub build: &'static str,
-    /// Contact ratio ε, counted over both meshing zones.
+    /// Contact ratio ε, counted over all meshing zones.
     pub coincidence_degree: f64,
-    /// Where a tooth touches the ring's flank.
+    /// Range of positions in which a tooth touches the ring's flank.
     pub engagement: EngagementAnswer,
-    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
+    /// Number of teeth in mesh over the input angle: in one zone if the zones are equal, otherwise in all zones
+    /// together.
     pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
-    /// Whether they are.
+    /// True if the zones are equal.
     #[serde(skip)]
     #[schema(ignore)]
     zones_are_alike: bool,
-    /// Whether the ring's tips are cut away.
+    /// Undercut of the ring's tips.
     pub undercut: UndercutAnswer,
-    /// The input angle after which the load pattern repeats.
+    /// Input angle after which the load pattern repeats.
     pub period_deg: f64,
-    /// What a designer should be told.
+    /// Findings about the design.
     pub findings: Vec<FindingAnswer>,
 }
 
-/// How many teeth, over the input angle: of a zone where the zones are alike, elsewhere, and given `deviations`, of all of them together.
+/// Number of teeth over the input angle: in one zone if the zones are equal, otherwise, or with `deviations`, in all
+/// zones together.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct TeethInMeshAnswer {
-    /// At least.
+    /// Smallest number.
     pub min: u64,
-    /// At most.
+    /// Largest number.
     pub max: u64,
 }
 
@@ -62,7 +64,7 @@ impl std::fmt::Display for TeethInMeshAnswer {
     }
 }
 
-/// What is asked.
+/// The question for the contact ratio.
 #[derive(Debug)]
 pub struct CoincidenceDegree;
 

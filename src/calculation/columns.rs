@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_are_those_of_serde_json() {
+    fn writes_same_bytes_as_serde_json() {
         for count in 0..40 {
             let column: Vec<_> = (0..count).map(|i| (f64::from(i / 3) * 0.1).tan()).collect();
             let equal: Vec<_> = (0..count).map(|_| -2.225_073_858_507_201_4e-308).collect();
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_null_wherever_it_stands() {
+    fn writes_non_finite_numbers_as_null() {
         for values in [[f64::NAN, 1.5, 2.5], [1.5, f64::NAN, 2.5], [1.5, 2.5, f64::INFINITY]] {
             assert_eq!(text(&values), serde_json::to_string(&values).unwrap());
             assert_eq!(text(&[values; 9]), serde_json::to_string(&[values; 9]).unwrap());
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_numbers_of_both_signs_of_zero_keep_their_sign() {
+    fn keeps_sign_of_zero() {
         assert_eq!(text(&[0.0, -0.0, -0.0, 0.0]), "[0.0,-0.0,-0.0,0.0]");
     }
 }

@@ -1,4 +1,4 @@
-//! The design document: wire types, and their one conversion into the solver's.
+//! The design document: wire types, and their one conversion into the solver's types.
 //!
 //! A document that is written as JSON reads back as itself.
 
@@ -44,7 +44,8 @@ pub use resolved::*;
 use drive::Counted;
 use number::given;
 
-/// One document for every endpoint: each reads only what it needs. Lengths in mm, torques in N·m, moduli in GPa, stiffnesses in N/mm.
+/// Design document for every endpoint; each endpoint reads only what it needs. Lengths are in mm, torques in N·m,
+/// moduli in GPa, stiffnesses in N/mm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 #[schema(example = json!({
@@ -56,69 +57,71 @@ use number::given;
     "load": { "input_torque_nm": 20.0 }
 }))]
 pub struct Design {
-    /// The drive itself.
+    /// Wave generator, teeth and ring.
     pub drive: DriveDocument,
-    /// Materials by part; steel where left out.
+    /// Material of each part. Default: steel.
     #[serde(default)]
     pub materials: MaterialsDocument,
-    /// The load; only a sweep needs it.
+    /// Load. Needed for a sweep only.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub load: Option<LoadDocument>,
-    /// Friction; only a sweep reads it, and left out, nothing of it is computed.
+    /// Friction. Used by a sweep only. Default: friction is not calculated.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub friction: Option<FrictionDocument>,
     /// The model of load sharing.
     #[serde(default)]
     pub model: ModelDocument,
-    /// Parts made otherwise than conjugate.
+    /// Modification: intentional differences of the parts from the conjugate shape. A positive value opens a gap.
+    /// Default: none.
     #[serde(default)]
     pub modification: ModificationDocument,
-    /// Single items of the parts as they came out.
+    /// Deviations of individual items of the parts. A positive value opens a gap. Default: none.
     #[serde(default)]
     pub deviations: DeviationsDocument,
-    /// The input angles of a sweep.
+    /// Input angles of a sweep.
     #[serde(default)]
     pub sweep: SweepDocument,
-    /// The sampling of profiles.
+    /// Sampling of profiles.
     #[serde(default)]
     pub profile: ProfileDocument,
-    /// What is asked of `/v1/accuracy`.
+    /// Settings of `/v1/accuracy`.
     #[serde(default)]
     pub accuracy: AccuracyDocument,
-    /// The parts as they are made: clearances, and what the mechanics leave free. Forces read the clearances, those on flat-sided teeth also the carrier's
-    /// radii, between which the flats are borne. A sweep estimates from the rest what gives way behind the contacts, which its forces leave out.
+    /// The parts as manufactured: clearances, and dimensions that the mechanics do not determine. Forces depend on the
+    /// clearances, and for flat-sided teeth on the carrier's radii. From the other dimensions a sweep estimates the
+    /// compliance of the supports, which its forces do not include.
     #[serde(default)]
     pub parts: PartsDocument,
-    /// How the parts stand in a drawing of all of them.
+    /// Position of the parts in a drawing of the assembly.
     #[serde(default)]
     pub assembly: AssemblyDocument,
 }
 
-/// The loads in turn.
+/// Load spectrum.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Duty {
-    /// Each of them.
+    /// Points of the duty.
     pub points: Vec<DutyPoint>,
-    /// The one with the largest torque, which has the largest forces, stresses and wind-up of all.
+    /// Index of the point with the largest torque, which has the largest forces, stresses and wind-up.
     pub hardest: usize,
-    /// Whether the document has a duty, or a single load.
+    /// True if the document has a duty, false for a single load.
     pub is_asked: bool,
 }
 
-/// One of them.
+/// Point of a duty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DutyPoint {
-    /// Its torque.
+    /// Torque.
     pub torque: Torque,
     /// Speed of the wave generator.
     pub input_speed_rpm: Option<f64>,
-    /// Its share of the running time.
+    /// Share of the running time.
     pub share_of_time: f64,
 }
 
-/// The torque where exactly one is given.
+/// Returns the torque if exactly one is given.
 fn one_torque(input_nm: Option<f64>, output_nm: Option<f64>, pointer: String) -> Result<Torque, Fault> {
     let fault = |code, detail: &str| Fault { pointer, code, detail: detail.into() };
     match (input_nm, output_nm) {
@@ -133,15 +136,15 @@ fn one_torque(input_nm: Option<f64>, output_nm: Option<f64>, pointer: String) ->
 }
 
 impl Design {
-    /// The document that a text holds, normalised.
+    /// Reads a document from text and normalises it.
     ///
     /// # Errors
-    /// Where it holds none: the first structural fault.
+    /// The first structural fault of the text.
     pub fn read(text: &[u8]) -> Result<Self, NoAnswer> {
         Ok(json::read::<Self>(text)?.normalised())
     }
 
-    /// The document with what may be left out filled in, so that equal designs are equal bytes.
+    /// Returns the document with defaults filled in, so that equal designs have equal bytes.
     pub fn normalised(mut self) -> Self {
         if self.sweep.tolerance.is_none() {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
@@ -151,7 +154,7 @@ impl Design {
         self
     }
 
-    /// The drive's parameters.
+    /// Returns the parameters of the drive.
     pub fn drive_parameters(&self) -> DriveParameters {
         let DriveDocument { wave_generator, teeth, ring } = &self.drive;
         let Counted { count, installed, radius_mm } = teeth.counted();
@@ -166,8 +169,8 @@ impl Design {
         }
     }
 
-    /// Violations with the numbers that stand in the document, where the solver's count could not hold them; without those of `installed`
-    /// where it does not stand there: they are faults of `count`, which has them too.
+    /// Returns the violations with the numbers of the document, if they exceed the solver's integers. Violations of a
+    /// default `installed` are left out, because `count` has the same ones.
     pub fn as_written(&self, violations: &[Violation]) -> Vec<Violation> {
         let Counted { count, installed, .. } = self.drive.teeth.counted();
         let as_written = |&violation: &Violation| match violation {
@@ -187,10 +190,10 @@ impl Design {
         violations.iter().filter_map(as_written).collect()
     }
 
-    /// The load's parameters, for a drive that has pointed or bored tips or not.
+    /// Returns the parameters of the load, for a drive with or without pointed or bored tips.
     ///
     /// # Errors
-    /// A fault where the document has no load, or not exactly one torque.
+    /// A fault if the document has no load, or not exactly one torque.
     pub fn load_parameters(&self, has_pointed_tips: bool) -> Result<LoadParameters, Fault> {
         self.require_one_clearance()?;
         self.require_one_choice_of_refinements()?;
@@ -230,7 +233,8 @@ impl Design {
         })
     }
 
-    /// The radii of the carrier that bears the flats of flat-sided teeth, as far as they are given; forces on other teeth do not depend on them.
+    /// Returns the given radii of the carrier that supports flat-sided teeth. Forces on other teeth do not depend on
+    /// them.
     pub fn carrier_of_flats(&self) -> CarrierRadii {
         let CarrierPartDocument { inner_radius_mm, outer_radius_mm, .. } = self.parts.carrier;
         match self.drive.teeth {
@@ -239,7 +243,7 @@ impl Design {
         }
     }
 
-    /// The loads in turn, of a document with a load; a single one where it has no duty.
+    /// Returns the points of the duty, or a single one without duty; none without a load.
     ///
     /// # Errors
     /// As [`Self::load_parameters`].
@@ -276,7 +280,7 @@ impl Design {
         if points.is_empty() {
             return Err(fault(FieldCode::OutOfRange, "/load/duty".into(), "a duty has one point or more"));
         }
-        // Every force grows with the torque, so the hardest point is that of the largest.
+        // All forces grow with the torque, so the point with the largest torque governs.
         let drive = self.drive_parameters();
         let ratio = drive.teeth as f64 / drive.wave_generator.lobes() as f64;
         let input_nm = |point: &DutyPoint| match point.torque {
@@ -288,7 +292,8 @@ impl Design {
         Ok(Duty { points, hardest, is_asked: true })
     }
 
-    /// Every number of the duty that is out of its range, or else shares that do not add up to one; of a load without one that of the speed.
+    /// Returns every value of the duty that is out of its range, or else shares that do not add up to one. Without a
+    /// duty it checks the speed of the load.
     ///
     /// # Errors
     /// As [`Self::load_parameters`].
@@ -316,17 +321,17 @@ impl Design {
         Ok(violations)
     }
 
-    /// The wear rates of the parts, where they are given.
+    /// Returns the wear rates of the parts, if given.
     pub fn wear_rate_mm3_per_nm(&self) -> Option<PerContact<f64>> {
         self.friction.as_ref().and_then(FrictionDocument::wear_rate_mm3_per_nm)
     }
 
-    /// What the life of the wave generator's bearing follows from, where it is asked for.
+    /// Returns the data for the life of the wave generator's bearing, if a load rating is given.
     pub fn bearing_rating(&self) -> Option<BearingRating> {
         self.friction.as_ref().and_then(FrictionDocument::bearing_rating)
     }
 
-    /// Friction, where there is any.
+    /// Returns the friction, if given.
     ///
     /// # Errors
     /// Every value that is out of its range.
@@ -342,10 +347,10 @@ impl Design {
         }
     }
 
-    /// Where a sweep looks.
+    /// Returns the input angles of the sweep.
     ///
     /// # Errors
-    /// A fault where the document wants samples and a tolerance; inside, the violation of a range.
+    /// A fault if the document has both samples and a tolerance; inside, the violation of a range.
     pub fn sweep_points(&self, max_states: u64) -> Result<Result<Points, Violation>, Fault> {
         let SweepDocument { samples, tolerance, .. } = self.sweep;
         match (samples, tolerance) {
@@ -362,7 +367,7 @@ impl Design {
         }
     }
 
-    /// The relative error that is asked for.
+    /// Returns the requested relative error.
     ///
     /// # Errors
     /// The violation of its range.
@@ -371,10 +376,10 @@ impl Design {
         Parameter::RequestedError.check(requested_error).map_or(Ok(requested_error), Err)
     }
 
-    /// What the mechanics leave free.
+    /// Returns the dimensions that the mechanics do not determine.
     ///
     /// # Errors
-    /// A fault where the document gives a contact two gaps.
+    /// A fault if the document gives a contact two different gaps.
     pub fn parts_parameters(&self) -> Result<PartsParameters, Fault> {
         self.require_one_clearance()?;
         let PartsDocument { wave_generator, ring, carrier, teeth: _ } = &self.parts;
@@ -392,13 +397,13 @@ impl Design {
         })
     }
 
-    /// How the parts are held, as far as the document says.
+    /// Returns the supports of the parts, as far as given.
     pub fn support(&self) -> Support {
         let PartsDocument { ring, carrier, .. } = &self.parts;
         Support { fingers: carrier.fingers.map(Into::into), rim: ring.rim.map(Into::into) }
     }
 
-    /// What a drawing is asked for.
+    /// Returns the parameters of a drawing.
     pub fn drawing_parameters(&self, max_points: u64) -> DrawingParameters {
         DrawingParameters {
             chord_tolerance_mm: self.profile.chord_tolerance_mm,
@@ -407,7 +412,7 @@ impl Design {
         }
     }
 
-    /// What profiles are asked for.
+    /// Returns the parameters of the profiles.
     ///
     /// # Errors
     /// The violation of the tolerance's range.

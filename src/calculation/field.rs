@@ -1,100 +1,100 @@
-//! Fields of the design document: where each stands, and what can be wrong with it.
+//! Fields of the design document: their pointers, and their kinds of error.
 
 use serde::Serialize;
 use toothwave_solver::violation::{Listed, Misfit, Modified, OfDutyPoint, Violation};
 use toothwave_solver::{Contact, Parameter, Part};
 use utoipa::ToSchema;
 
-/// A field at fault.
+/// Error of a field.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FieldError {
     /// JSON pointer (RFC 6901) to the field.
     pub pointer: String,
-    /// The kind of fault, a stable word.
+    /// Kind of error, as a stable word.
     pub code: FieldCode,
-    /// What is wrong and what would be right.
+    /// Message: what is wrong and what to do.
     pub detail: String,
-    /// The field's value, where it is a number.
+    /// Value of the field, if it is a number.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub value: Option<f64>,
-    /// The limit that the value is beyond, or, of a number of teeth or entries, the nearest one that would do.
+    /// The violated limit. For a number of teeth or entries, the nearest valid number.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub limit: Option<f64>,
 }
 
-/// Kinds of fault of a field.
+/// Kinds of field errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FieldCode {
-    /// A field that the document does not know.
+    /// The field is unknown.
     UnknownField,
-    /// A required field that is not there.
+    /// A required field is missing.
     MissingField,
-    /// The same field twice.
+    /// The field is given twice.
     DuplicateField,
-    /// A value of another type.
+    /// The value has the wrong type.
     WrongType,
-    /// A word that is not one of the choices.
+    /// The word is not a valid choice.
     UnknownChoice,
-    /// A number that no double can hold.
+    /// The number is too large for a double.
     NumberTooLarge,
-    /// Two fields of which only one may be there.
+    /// Only one of two fields may be given.
     ConflictingFields,
-    /// A value outside its range.
+    /// The value is out of its range.
     OutOfRange,
-    /// A list that has neither no entry nor one for each item.
+    /// The list must be empty or have one entry for each item.
     WrongLength,
-    /// A quantity that nothing free changes, as an objective or beyond its limit.
+    /// No free field changes a quantity that is an objective or violates its limit.
     Unaffected,
-    /// The semi-major axis does not exceed the semi-minor one.
+    /// The semi-major axis does not exceed the semi-minor axis.
     CamNotElongated,
     /// The wave generator is too small for its stroke.
     CamTooSmall,
-    /// Carrier and ring do not differ by a tooth for each lobe.
+    /// The numbers of teeth of carrier and ring do not differ by one for each lobe.
     ToothDifference,
-    /// Installed teeth that do not divide the theoretical ones.
+    /// The number of installed teeth does not divide the theoretical number (`count`).
     InstalledNoDivisor,
-    /// A groove that is no wider than the ball in it.
+    /// A groove is not wider than its ball.
     GrooveTooTight,
-    /// A flat as long as the tooth is thick.
+    /// The flat is as long as the tooth's diameter, or longer.
     FlatTooLong,
     /// Neighbouring teeth touch somewhere on their path.
     TeethTouch,
-    /// The ring's tips reach in to the wave generator.
+    /// The ring's tips reach the wave generator.
     NoCarrierAnnulus,
-    /// The bore takes the whole flank away.
+    /// The bore removes the whole flank.
     BoreLeavesNoFlank,
-    /// A clearance under `projection` that would load a tooth instead of freeing it.
+    /// With `projection` this clearance would load a tooth instead of relieving it.
     ClearanceNotMonotone,
-    /// The ring's outer radius does not exceed the largest of its tooth spaces, at the root or, where a tip relief reaches beyond it, there.
+    /// The ring's outer radius does not exceed the largest radius of its tooth spaces, including the tip relief.
     RingWithoutRim,
     /// The carrier's inner radius does not exceed the cam's largest radius.
     CarrierMeetsCam,
     /// The carrier's outer radius reaches the ring's tips.
     CarrierMeetsRing,
-    /// The carrier's outer radius does not exceed its inner one.
+    /// The carrier's outer radius does not exceed its inner radius.
     CarrierWithoutWall,
-    /// The slots run into each other all the way to the carrier's outer radius.
+    /// The slots overlap up to the carrier's outer radius.
     SlotsTakeCarrier,
-    /// The wave generator's bore cuts it open.
+    /// The wave generator's bore cuts through its outline.
     BoreTakesCam,
-    /// The wave generator's clearance gives it a cusp.
+    /// The wave generator's clearance gives its outline a cusp.
     ClearanceTakesCam,
-    /// The teeth's clearance reaches their radius.
+    /// The teeth's clearance is as large as their radius, or larger.
     ClearanceTakesTooth,
-    /// A modification that leaves nothing of a part's outline.
+    /// The modification removes the whole outline of a part.
     ModificationLeavesNothing,
-    /// More states than `max_states`.
+    /// There are more states than `max_states`.
     TooManyStates,
-    /// More profile points than `max_profile_points`.
+    /// There are more profile points than `max_profile_points`.
     TooManyPoints,
-    /// More variants than `max_study_variants`, or more bytes of them than `max_study_bytes`.
+    /// There are more variants than `max_study_variants`, or more bytes than `max_study_bytes`.
     TooManyVariants,
 }
 
-/// A violation as the field that it is about.
+/// Converts a violation to the error of its field.
 impl From<&Violation> for FieldError {
     fn from(violation: &Violation) -> Self {
         use Parameter::{InstalledTeeth, RingTeeth, SemiMajor, TipRadius, ToothRadius};
@@ -175,7 +175,7 @@ impl From<&Violation> for FieldError {
 }
 
 impl FieldError {
-    /// A violation that is about a choice, which has no number.
+    /// Makes the error of a violation about a choice, which has no number.
     fn conflict(violation: &Violation, parameter: Parameter) -> Self {
         Self {
             pointer: pointer(parameter),
@@ -187,7 +187,7 @@ impl FieldError {
     }
 }
 
-/// Where a parameter stands in the design document.
+/// Returns the JSON pointer of a parameter in the design document.
 pub fn pointer(parameter: Parameter) -> String {
     match parameter {
         Parameter::SemiMajor => "/drive/wave_generator/semi_major_mm".into(),
@@ -257,7 +257,7 @@ pub fn pointer(parameter: Parameter) -> String {
     }
 }
 
-/// A number of the modification as documents spell it.
+/// Returns the name of a modification in documents.
 const fn modified_name(modified: Modified) -> &'static str {
     match modified {
         Modified::RingEquidistant => "ring_equidistant_um",
@@ -274,7 +274,7 @@ const fn modified_name(modified: Modified) -> &'static str {
     }
 }
 
-/// A list of the deviations as documents spell it.
+/// Returns the name of a list of deviations in documents.
 const fn listed_name(listed: Listed) -> &'static str {
     match listed {
         Listed::ToothRadius => "tooth_radius_um",
@@ -286,7 +286,7 @@ const fn listed_name(listed: Listed) -> &'static str {
     }
 }
 
-/// A part as documents spell it.
+/// Returns the name of a part in documents.
 pub const fn part_name(part: Part) -> &'static str {
     match part {
         Part::WaveGenerator => "wave_generator",
@@ -296,7 +296,7 @@ pub const fn part_name(part: Part) -> &'static str {
     }
 }
 
-/// A contact as documents spell it.
+/// Returns the name of a contact in documents.
 pub const fn contact_name(contact: Contact) -> &'static str {
     match contact {
         Contact::WaveGenerator => "wave_generator",

@@ -13,7 +13,7 @@ use crate::design::{DeprecatedField, Design, SetBackTwice};
 use crate::field::{contact_name, pointer};
 use crate::no_answer::NoAnswer;
 
-/// What a designer should be told about a drive that can exist; docs/findings.md has the formula behind each code.
+/// What a designer should be told about a drive that can exist; docs/reference/findings.md has the formula behind each code.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FindingAnswer {
     /// The kind of finding, a stable word.

@@ -1,4 +1,4 @@
-//! The forms that answers are written in.
+//! Formats of answers.
 
 use std::io::{self, Write};
 
@@ -8,24 +8,24 @@ use utoipa::{IntoParams, ToSchema};
 use crate::columns;
 use crate::decimal_comma::DecimalComma;
 
-/// A format of answers.
+/// A format of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// As programs read it.
+    /// JSON, for programs.
     Json,
-    /// Columns.
+    /// Columns as comma-separated values.
     Csv,
     /// The same with a decimal comma and semicolons between fields.
     CsvComma,
-    /// Columns in Apache Arrow's IPC stream.
+    /// Columns as an Apache Arrow IPC stream.
     Arrow,
-    /// Columns in Apache Parquet.
+    /// Columns as an Apache Parquet file.
     Parquet,
-    /// For a terminal.
+    /// Summary for a terminal.
     Text,
-    /// A picture.
+    /// Image.
     Svg,
-    /// Outlines for CAD and workshops.
+    /// Outlines for CAD and manufacturing.
     Dxf,
     /// Solids for CAD.
     Step,
@@ -57,12 +57,12 @@ impl Format {
         if matches!(self, Self::CsvComma) { Self::Csv } else { self }
     }
 
-    /// Whether each number of the answer is written.
+    /// True if it writes every number of the answer.
     pub const fn writes_all_numbers(self) -> bool {
         matches!(self, Self::Json | Self::Csv | Self::CsvComma | Self::Arrow | Self::Parquet)
     }
 
-    /// The bytes of numbers and of their text: a number has 8 bytes, and its text about 20.
+    /// Bytes of numbers and of their text: a number has 8 bytes, its text about 20.
     pub const fn bytes_with_text(self, numbers_bytes: u64) -> u64 {
         if self.writes_all_numbers() { numbers_bytes * 7 / 2 } else { numbers_bytes }
     }
@@ -99,34 +99,34 @@ impl Decimal {
     }
 }
 
-/// Writes an answer in one form.
+/// Function that writes an answer in one format.
 pub type Form<A> = fn(&A, &mut dyn Write) -> io::Result<()>;
 
-/// What an answer can be written as.
+/// Formats of an answer type.
 pub trait Forms: Serialize + Sized + 'static {
-    /// The formats beside JSON, the preferred first, each with what writes it.
+    /// Formats in addition to JSON, the preferred one first, each with its writer.
     const FORMS: &'static [(Format, Form<Self>)];
 
-    /// About how many bytes the JSON takes, so that its buffer need not grow.
+    /// Estimated bytes of the JSON, to size its buffer.
     fn expected_bytes(&self) -> usize {
         4096
     }
 
-    /// About how many bytes the numbers of the answer take, with what writing them in a format takes beside the text.
+    /// Estimated bytes of the answer's numbers, and of the buffers that writing needs.
     fn held_bytes(&self, _format: Format) -> u64 {
         0
     }
 
-    /// About how many bytes the answer takes with its text in this format.
+    /// Estimated bytes of the answer with its text in this format.
     fn bytes(&self, format: Format) -> u64 {
         let text_bytes = if format.writes_all_numbers() { self.expected_bytes() as u64 } else { 0 };
         self.held_bytes(format) + text_bytes
     }
 
-    /// Writes the answer in one of its formats, or in JSON.
+    /// Writes the answer in one of its formats, or else as JSON.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// The errors of the writer.
     fn write(&self, format: Format, writer: &mut impl Write) -> io::Result<()> {
         match Self::FORMS.iter().find(|(known, _)| *known == format.offered()) {
             Some((_, form)) if format == Format::CsvComma => form(self, &mut DecimalComma::new(writer)),
@@ -136,7 +136,7 @@ pub trait Forms: Serialize + Sized + 'static {
     }
 }
 
-/// A CSV error as what it is: one of the writer, whose kind tells a closed pipe from a full disk.
+/// Converts a CSV error to the I/O error of its writer. Its kind distinguishes a closed pipe from a full disk.
 pub fn csv_error(error: csv::Error) -> io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error,

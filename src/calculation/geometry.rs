@@ -1,4 +1,4 @@
-//! The mating parts' profiles and what a designer decides by.
+//! Geometry: profiles of the mating parts and the key figures of a design.
 
 use std::io::{self, Write};
 
@@ -17,25 +17,25 @@ use crate::key::Encode;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, checked_drive, require_finite};
 
-/// The geometry of a drive. Ring and path stand in the ring's frame, x along the middle of a tooth space; the wave generator
-/// in its own, x along the middle of a lobe, the major axis of an ellipse.
+/// Geometry of a drive. Ring and path are in the ring's frame: x runs through the middle of a tooth space. The wave
+/// generator is in its own frame: x runs through the middle of a lobe (the major axis of an ellipse).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct GeometryAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
-    /// The build that computed it: equal builds on equal processors give equal bytes.
+    /// Build of the program. Equal builds on equal processors give equal bytes.
     pub build: &'static str,
     /// `i_HG = Z_G/(Z_G - Z_K)`: input speed over carrier speed, ring fixed.
     pub transmission_ratio: f64,
     /// `i_HK = -Z_K/(Z_G - Z_K)`: input speed over ring speed, carrier fixed.
     pub transmission_ratio_carrier_fixed: f64,
-    /// The members exchanged: ratios and torques by the one that stands still. What friction leaves of them is in a sweep's `losses`.
+    /// Ratios and torques for each choice of the fixed member, without losses. For friction see `losses` of a sweep.
     pub members: MembersAnswer,
-    /// The input angle after which the load pattern repeats.
+    /// Input angle after which the load pattern repeats.
     pub period_deg: f64,
-    /// Whether the ring's tips are cut away.
+    /// Undercut of the ring's tips.
     pub undercut: UndercutAnswer,
-    /// Where a tooth touches the ring's flank.
+    /// Range of positions in which a tooth touches the ring's flank.
     pub engagement: EngagementAnswer,
     /// The ring.
     pub ring: RingAnswer,
@@ -43,16 +43,16 @@ pub struct GeometryAnswer {
     pub wave_generator: WaveGeneratorAnswer,
     /// The carrier, an annulus between wave generator and ring tips.
     pub carrier: CarrierAnswer,
-    /// The teeth among each other.
+    /// Clearance between the teeth.
     pub teeth: TeethAnswer,
     /// Path of a tooth's centre in the ring's frame.
     pub tooth_center_path: ProfileAnswer,
-    /// What a designer should be told.
+    /// Findings about the design.
     pub findings: Vec<FindingAnswer>,
 }
 
-/// The members exchanged, by the one that stands still. Driven the other way round every ratio is its reciprocal, and the torque that holds the
-/// fixed member is over the torque that is taken off.
+/// Ratios and torques for each fixed member. If driven in reverse, each ratio is its reciprocal, and the holding torque
+/// is relative to the output torque.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct MembersAnswer {
     /// The wave generator drives the carrier.
@@ -63,33 +63,34 @@ pub struct MembersAnswer {
     pub wave_generator_fixed: MemberFixedAnswer,
 }
 
-/// Ratio and torques with one member fixed, losses neglected; negative where the sense is the other one.
+/// Ratio and torques with one member fixed, without losses. Negative for the opposite direction.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct MemberFixedAnswer {
-    /// Speed of the driving member over that of the driven one, and torque taken off the driven one over that put into the driving one.
+    /// Speed of the driving member over speed of the driven one; also output torque over input torque.
     pub ratio: f64,
-    /// Torque that holds the fixed member, over that put into the driving one.
+    /// Torque that holds the fixed member, over the input torque.
     pub holding_torque_ratio: f64,
 }
 
-/// Whether the ring's tips are cut away by their own envelope.
+/// Undercut of the ring's tips by their own envelope.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct UndercutAnswer {
-    /// Whether they are, before any bore.
+    /// True if undercut occurs, before any bore.
     pub occurs: bool,
-    /// The least tooth radius that undercuts; left out where none does.
+    /// Smallest tooth radius with undercut. Absent if no radius has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub critical_tooth_radius_mm: Option<f64>,
 }
 
-/// The tooth's polar angle from the middle of its lobe, the major axis of an ellipse, where it starts and stops to touch the ring's flank.
+/// Positions at which a tooth begins and ends to touch the ring's flank, as polar angles from the middle of its lobe
+/// (the major axis of an ellipse).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct EngagementAnswer {
-    /// Where it starts, towards the tip.
+    /// Begin, near the tip.
     #[schema(minimum = 0, maximum = 180)]
     pub start_deg: f64,
-    /// Where it stops, at the root.
+    /// End, at the root.
     pub end_deg: f64,
 }
 
@@ -100,47 +101,48 @@ pub struct RingAnswer {
     pub root_radius_mm: f64,
     /// Radius of the tips: natural, trimmed by undercut, or bored.
     pub tip_radius_mm: f64,
-    /// Root radius less tip radius.
+    /// Root radius minus tip radius.
     pub tooth_height_mm: f64,
-    /// Largest pressure angle β of the engaged flank (its normal against the radius).
+    /// Largest pressure angle β of the engaged flank, between its normal and the radius.
     pub pressure_angle_max_deg: f64,
-    /// Its profile.
+    /// Profile.
     pub profile: ProfileAnswer,
 }
 
 /// The wave generator.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct WaveGeneratorAnswer {
-    /// Largest pressure angle γ of an engaged tooth (the cam's normal against the radius).
+    /// Largest pressure angle γ of an engaged tooth, between the cam's normal and the radius.
     pub pressure_angle_max_deg: f64,
-    /// Its closed profile.
+    /// Closed profile.
     pub profile: ProfileAnswer,
 }
 
-/// The room that the mechanics leave the carrier, and its thinnest wall.
+/// Space for the carrier between the other parts, and its thinnest wall.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct CarrierAnswer {
-    /// Its inner radius is above this: the wave generator's largest radius, the semi-major axis of an ellipse.
+    /// Lower limit of its inner radius: the wave generator's largest radius (the semi-major axis of an ellipse).
     pub inner_radius_limit_mm: f64,
-    /// Its outer radius is below this: the ring's tip radius.
+    /// Upper limit of its outer radius: the ring's tip radius.
     pub outer_radius_limit_mm: f64,
-    /// The difference of the two, shared by the carrier and its radial clearances.
+    /// Difference of the two limits, for the carrier and its radial clearances.
     pub radial_space_mm: f64,
-    /// The wall between two slots at the inner limit, where it is thinnest; not positive where the slots run into each other.
+    /// Smallest wall thickness between two slots, at the inner limit. Zero or negative if the slots overlap.
     pub slot_wall_mm: f64,
-    /// How far the centre of an engaged tooth stays outside the inner limit at least; negative where it leaves the annulus.
+    /// Smallest distance of an engaged tooth's centre from the inner limit. Negative if it leaves the annulus.
     pub tooth_center_clearance_inner_mm: f64,
-    /// How far the centre of an engaged tooth stays inside the outer limit at least; negative where it leaves the annulus.
+    /// Smallest distance of an engaged tooth's centre from the outer limit. Negative if it leaves the annulus.
     pub tooth_center_clearance_outer_mm: f64,
-    /// The wall of its slot that a loaded tooth leans on.
+    /// The slot wall that supports a loaded tooth.
     pub loaded_wall: SlotWall,
-    /// The finger between slots 0 and 1 of a carrier that fills the annulus; left out where nothing stays between the slots.
+    /// The finger between slots 0 and 1 of a carrier that fills the annulus. Absent if no material is left between the
+    /// slots.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub finger: Option<FingerAnswer>,
 }
 
-/// A wall of a slot, in the sense in which the wave generator turns.
+/// A wall of a slot, relative to the direction of rotation of the wave generator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SlotWall {
@@ -150,22 +152,23 @@ pub enum SlotWall {
     Trailing,
 }
 
-/// What stands between two neighbouring slots of a carrier without clearance or play, in the carrier's frame, slot 0 along x.
+/// Finger between two neighbouring slots of a carrier without clearance, in the carrier's frame: slot 0 is along x.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FingerAnswer {
-    /// Its corners, counter-clockwise from the inner end of slot 0's wall: four, or three where the slots run into each other. The
-    /// second and third are joined by an arc of the outer limit, the fourth and first by one of the inner limit, others straight.
+    /// Corners, counter-clockwise from the inner end of slot 0's wall: four, or three if the slots overlap. An arc of
+    /// the outer limit joins the second and third. An arc of the inner limit joins the fourth and first. The other
+    /// edges are straight.
     pub corners: ProfileAnswer,
 }
 
-/// The teeth among each other.
+/// Clearance between the teeth.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct TeethAnswer {
-    /// The least gap between neighbouring installed teeth anywhere on their path.
+    /// Smallest gap between neighbouring installed teeth on their path.
     pub gap_min_mm: f64,
 }
 
-/// A curve as points of equal index.
+/// A curve as lists of coordinates with equal length.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ProfileAnswer {
     /// x coordinates.
@@ -206,7 +209,8 @@ impl From<&Drive> for UndercutAnswer {
 }
 
 impl SlotWall {
-    /// The ring pushes a tooth along for s = +1, against the input's sense for s = -1 (docs/theory.md section 5).
+    /// The ring pushes a tooth in the input's direction for s = +1, and against it for s = -1 (docs/explanation/theory.md section
+    /// 5).
     fn loaded(drive: &Drive) -> Self {
         if drive.sense() > 0.0 { Self::Leading } else { Self::Trailing }
     }
@@ -225,11 +229,11 @@ impl From<&Drive> for EngagementAnswer {
     }
 }
 
-/// What is asked.
+/// The question for the geometry.
 #[derive(Debug)]
 pub struct Geometry;
 
-/// A point in its columns, and while they are made where they come from.
+/// Bytes of a point: its columns, and the points from which they are made.
 const POINT_BYTES: u64 = 2 * size_of::<[f64; 2]>() as u64;
 
 impl Question for Geometry {
@@ -313,7 +317,7 @@ impl Forms for GeometryAnswer {
     const FORMS: &'static [(Format, Form<Self>)] = &[(Format::Csv, Self::write_csv), (Format::Text, Self::write_text)];
 
     fn expected_bytes(&self) -> usize {
-        // Two numbers of about 18 characters, each with its comma.
+        // Two numbers of about 18 characters, each with a comma.
         4096 + 40 * self.points()
     }
 

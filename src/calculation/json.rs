@@ -1,7 +1,7 @@
-//! From JSON text to wire types, with faults that name a code and a place.
+//! Parser from JSON text to document types, with errors that name a code and a place.
 //!
-//! serde_json alone would take an array for an object, keep no place, and tell kinds of fault apart only by their text. So
-//! the text becomes a tree first (no JSON: the first kind of fault), and the tree feeds serde through a deserializer whose error is a
+//! serde_json alone accepts an array for an object, keeps no place, and has no kinds of error. So the text first
+//! becomes a tree (malformed JSON fails here). The tree then feeds serde through a deserializer with the error type
 //! [`Fault`].
 
 use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
@@ -9,30 +9,30 @@ use serde::{Deserialize, Serialize};
 
 use crate::field::FieldCode;
 
-/// Why a text is no document of the wanted form.
+/// Reason why a text is not a document of the expected form.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ReadError {
-    /// The text is no JSON.
+    /// The text is not JSON.
     Malformed {
-        /// What the parser says, with line and column.
+        /// Message of the parser, with line and column.
         detail: String,
     },
-    /// It is JSON of another form.
+    /// The JSON has another form.
     Fault(Fault),
 }
 
-/// A structural fault: the first one found.
+/// A structural error: the first one in the document.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
     /// JSON pointer to the field.
     pub pointer: String,
-    /// Kind of fault.
+    /// Kind of error.
     pub code: FieldCode,
-    /// What is wrong and what would be right.
+    /// Message: what is wrong and what to do.
     pub detail: String,
 }
 
-/// What some editors begin a UTF-8 text with; RFC 8259 lets a reader ignore it.
+/// Byte order mark of some editors. RFC 8259 allows a reader to ignore it.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
 /// Reads a document.
@@ -43,7 +43,7 @@ pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
     tree(text)?.read().map_err(ReadError::Fault)
 }
 
-/// Reads the tree of a text, whatever it is.
+/// Parses a text to a tree.
 ///
 /// # Errors
 /// See [`ReadError`].
@@ -56,17 +56,18 @@ pub fn tree(text: &[u8]) -> Result<Tree, ReadError> {
     }
     let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     if text.trim_ascii().is_empty() {
-        return Err(ReadError::Malformed { detail: "nothing was sent; send a design document".into() });
+        return Err(ReadError::Malformed { detail: "the body is empty. Send a design document".into() });
     }
     let mut parser = serde_json::Deserializer::from_slice(text);
     let tree: Tree = serde_path_to_error::deserialize(&mut parser).map_err(|error| {
-        // serde_json takes a number beyond the doubles and deep nesting for bad syntax; they are JSON all the same, if the rest is.
+        // serde_json reports a number beyond doubles, or deep nesting, as bad syntax. If the rest is valid, the text is
+        // JSON.
         let fault = match error.inner().to_string() {
             text if text.starts_with("number out of range") => {
-                Some((FieldCode::NumberTooLarge, "the number is beyond what a double can hold"))
+                Some((FieldCode::NumberTooLarge, "the number is too large for a double. Use a smaller one"))
             }
             text if text.starts_with("recursion limit exceeded") => {
-                Some((FieldCode::WrongType, "no document nests as deep as this"))
+                Some((FieldCode::WrongType, "the document has too many nested levels. Remove some"))
             }
             _ => None,
         };
@@ -87,12 +88,12 @@ pub fn tree(text: &[u8]) -> Result<Tree, ReadError> {
     Ok(tree)
 }
 
-/// A word of the API, as JSON spells it.
+/// Returns a word of the API, as in JSON.
 pub fn word(value: &impl Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|value| Some(value.as_str()?.to_owned())).unwrap_or_default()
 }
 
-/// JSON as it stands in a text, or as it is put together: what documents are read from.
+/// A JSON value, parsed or constructed. Documents are read from it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Tree {
     /// `null`.
@@ -105,26 +106,26 @@ pub enum Tree {
     Text(String),
     /// An array.
     Array(Vec<Self>),
-    /// An object, its fields in the order in which they stand.
+    /// An object with its fields in order.
     Object(Vec<(String, Self)>),
 }
 
-/// Which item of an array a name means: RFC 6901 knows neither a sign nor a leading zero, so that each item has one name.
+/// Returns the index that a name means. RFC 6901 forbids signs and leading zeros, so each item has one name.
 fn item(name: &str) -> Option<usize> {
     let is_digits = name.bytes().all(|byte| byte.is_ascii_digit());
     if is_digits && (name == "0" || !name.starts_with('0')) { name.parse().ok() } else { None }
 }
 
 impl Tree {
-    /// What the tree holds.
+    /// Deserializes the tree.
     ///
     /// # Errors
-    /// The first structural fault.
+    /// The first structural error.
     pub fn read<'de, T: Deserialize<'de>>(&self) -> Result<T, Fault> {
         T::deserialize(self)
     }
 
-    /// What stands at a place, of which the path names the fields.
+    /// Returns the value at a path of field names.
     pub fn at(&self, path: &[String]) -> Option<&Self> {
         path.iter().try_fold(self, |tree, name| match tree {
             Self::Object(fields) => fields.iter().find(|(key, _)| key == name).map(|(_, value)| value),
@@ -133,7 +134,7 @@ impl Tree {
         })
     }
 
-    /// Puts a value at a place, in objects that are made where there are none.
+    /// Sets the value at a path. Missing objects on the path are created.
     pub fn set(&mut self, path: &[String], value: Self) {
         let Some((name, rest)) = path.split_first() else {
             *self = value;
@@ -156,7 +157,7 @@ impl Tree {
         fields[index].1.set(rest, value);
     }
 
-    /// Takes away what stands at a place.
+    /// Removes the value at a path.
     pub fn remove(&mut self, path: &[String]) -> Option<Self> {
         let Self::Object(fields) = self else { return None };
         let (name, rest) = path.split_first()?;
@@ -164,7 +165,7 @@ impl Tree {
         if rest.is_empty() { Some(fields.remove(index).1) } else { fields[index].1.remove(rest) }
     }
 
-    /// About what the tree takes in memory.
+    /// Estimated memory in bytes.
     pub fn bytes(&self) -> usize {
         let below: usize = match self {
             Self::Null | Self::Bool(_) | Self::Number(_) => 0,
@@ -175,7 +176,7 @@ impl Tree {
         size_of::<Self>() + below
     }
 
-    /// The same with the fields of every object by name, so that equal trees are equal bytes.
+    /// Returns the tree with all fields sorted by name, so that equal trees have equal bytes.
     pub fn sorted(mut self) -> Self {
         match &mut self {
             Self::Object(fields) => {
@@ -208,13 +209,13 @@ impl Serialize for Tree {
     }
 }
 
-/// What a field's name takes beside its letters: the string itself, and what its allocation costs.
+/// Bytes of a field name in addition to its letters: the string and its allocation.
 const FIELD_BYTES: usize = size_of::<String>() + 16;
 
-/// As deep as JSON is read: what walks through a tree does so level by level on its stack.
+/// Deepest path. Walking a tree is recursive, so the depth is limited, as in serde_json.
 const MOST_LEVELS: usize = 128;
 
-/// The names that a JSON pointer (RFC 6901) goes through; none where it is no pointer, or leads deeper than any document is.
+/// Returns the names of a JSON pointer (RFC 6901), or none if it is invalid or too deep.
 pub fn path(pointer: &str) -> Option<Vec<String>> {
     let names = pointer.strip_prefix('/')?.split('/');
     if names.clone().nth(MOST_LEVELS).is_some() {
@@ -223,7 +224,7 @@ pub fn path(pointer: &str) -> Option<Vec<String>> {
     Some(names.map(|name| name.replace("~1", "/").replace("~0", "~")).collect())
 }
 
-/// Name of the newtype that a tree gives its arrays to as well.
+/// Name of a newtype for which a tree also accepts arrays.
 pub(crate) const ANY: &str = "any tree";
 
 impl<'de> Deserialize<'de> for Tree {
@@ -237,7 +238,7 @@ struct TreeVisitor;
 impl<'de> Visitor<'de> for TreeVisitor {
     type Value = Tree;
 
-    /// What other formats than trees do with a newtype.
+    /// Other formats pass their newtypes here.
     fn visit_newtype_struct<D: serde::Deserializer<'de>>(self, deserializer: D) -> Result<Tree, D::Error> {
         deserializer.deserialize_any(self)
     }
@@ -263,7 +264,7 @@ impl<'de> Visitor<'de> for TreeVisitor {
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<Tree, E> {
-        // -0.0 means nothing else than 0.0, and must not be told from it.
+        // -0.0 is the same value as 0.0 and must have the same hash.
         Ok(Tree::Number(value + 0.0))
     }
 
@@ -285,7 +286,7 @@ impl<'de> Visitor<'de> for TreeVisitor {
         while let Some(entry) = entries.next_entry()? {
             fields.push(entry);
         }
-        // An object of one field would take as much as one of four.
+        // Otherwise an object with one field has the capacity of four.
         fields.shrink_to_fit();
         Ok(Tree::Object(fields))
     }
@@ -314,7 +315,7 @@ impl<'de> serde::Deserializer<'de> for &Tree {
             Tree::Number(value) => visitor.visit_f64(*value),
             Tree::Text(value) => visitor.visit_str(value),
             Tree::Object(fields) => visitor.visit_map(Fields::new(fields, None)),
-            // What is read field by field would take an array for its fields in order.
+            // A type that is read field by field would accept an array as its fields in order.
             Tree::Array(_) => Err(de::Error::invalid_type(self.unexpected(), &visitor)),
         }
     }
@@ -333,8 +334,8 @@ impl<'de> serde::Deserializer<'de> for &Tree {
         }
     }
 
-    /// A word, or one of several kinds of object, which a field tells apart: those are enums named `by:` and the field, and perhaps `=` and
-    /// the kind that is meant where the field is left out.
+    /// Deserializes a word, or an object with a tag field. Enums of such objects are named `by:` and the tag, and
+    /// perhaps `=` and the default kind.
     fn deserialize_enum<V: Visitor<'de>>(
         self,
         name: &'static str,
@@ -368,7 +369,7 @@ impl<'de> serde::Deserializer<'de> for &Tree {
 
 struct Fields<'a> {
     fields: std::slice::Iter<'a, (String, Tree)>,
-    /// A field that was read already.
+    /// Name of a field that was read already.
     passed_over: Option<&'a str>,
     current: Option<&'a (String, Tree)>,
 }
@@ -389,7 +390,7 @@ impl<'de> MapAccess<'de> for Fields<'_> {
 
     fn next_value_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Fault> {
         let Some((key, value)) = self.current else {
-            return Err(de::Error::custom("a value was asked for before its key"));
+            return Err(de::Error::custom("a value was read before its key"));
         };
         seed.deserialize(value).map_err(|fault| fault.within(key))
     }
@@ -408,7 +409,7 @@ impl<'de> de::SeqAccess<'de> for Items<'_> {
     }
 }
 
-/// An object of a kind that one of its fields names.
+/// An object whose kind is in one of its fields.
 #[derive(Clone, Copy)]
 struct Union<'a> {
     tag: &'static str,
@@ -460,24 +461,24 @@ impl<'de> de::VariantAccess<'de> for Union<'_> {
 }
 
 impl Fault {
-    /// The same fault seen from the object that holds it under `key`.
+    /// Returns the same error, seen from the object that has it under `key`.
     pub fn within(mut self, key: &str) -> Self {
         self.pointer.insert_str(0, &format!("/{}", escaped(key)));
         self
     }
 
-    /// A fault of a field, seen from the object that holds it.
+    /// Makes the error of a field, seen from its object.
     pub fn of_field(code: FieldCode, field: &str, detail: String) -> Self {
         Self { pointer: format!("/{}", escaped(field)), code, detail }
     }
 }
 
-/// A key as a JSON pointer spells it (RFC 6901).
+/// Escapes a key for a JSON pointer (RFC 6901).
 fn escaped(key: &str) -> String {
     key.replace('~', "~0").replace('/', "~1")
 }
 
-/// Names one after the other.
+/// Joins names by commas.
 fn listed(names: &[&str]) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
@@ -498,16 +499,16 @@ impl de::Error for Fault {
         };
         let expected = match expected.to_string() {
             name if name == "f64" => "a number".into(),
-            // serde's derive names the Rust type here; its reader knows only objects.
+            // serde's derive gives the Rust type here. Readers of the message know only objects.
             name if name.starts_with("struct ") => "an object".into(),
             name => name,
         };
-        Self::custom(format_args!("{expected} is wanted here, not {found}"))
+        Self::custom(format_args!("the value is {found}, but {expected} is expected here"))
     }
 
     fn unknown_field(field: &str, known: &'static [&'static str]) -> Self {
         let known = if known.is_empty() { "no other".into() } else { listed(known) };
-        let detail = format!("the document knows no field `{field}` here; it knows {known}");
+        let detail = format!("the field `{field}` is unknown here. Use: {known}");
         Self::of_field(FieldCode::UnknownField, field, detail)
     }
 
@@ -516,14 +517,14 @@ impl de::Error for Fault {
     }
 
     fn duplicate_field(field: &'static str) -> Self {
-        Self::of_field(FieldCode::DuplicateField, field, format!("the field `{field}` stands here twice"))
+        Self::of_field(FieldCode::DuplicateField, field, format!("the field `{field}` is given twice. Remove one"))
     }
 
     fn unknown_variant(word: &str, known: &'static [&'static str]) -> Self {
         Self {
             pointer: String::new(),
             code: FieldCode::UnknownChoice,
-            detail: format!("`{word}` is no choice here; choose one of {}", listed(known)),
+            detail: format!("`{word}` is not a valid choice here. Use one of: {}", listed(known)),
         }
     }
 }

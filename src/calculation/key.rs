@@ -1,24 +1,24 @@
-//! What tells answers apart: a hash of everything that they depend on, in an encoding of its own.
+//! Keys of answers: a hash of everything that an answer depends on.
 //!
-//! Every field is written always, in the order of the document and without its name, so that no two designs share their bytes. A structure
-//! is encoded by `encoded!`, which names all its fields: one that was forgotten does not compile.
+//! Every field is encoded, in the order of the document and without its name, so that different designs have different
+//! bytes. `encoded!` encodes a structure and names all its fields; a missing one does not compile.
 
 use crate::BUILD;
 use crate::arithmetic::arithmetic;
 use crate::forms::Format;
 
-/// Bytes to be hashed.
+/// Bytes for the hash.
 #[derive(Debug, Default)]
 pub struct Encoder(Vec<u8>);
 
-/// A part of what an answer depends on.
+/// A value that an answer depends on.
 pub trait Encode {
-    /// Writes it, so that unequal values of a type are unequal bytes, and none is the beginning of another.
+    /// Writes the value. Different values of a type give different bytes, and none is the beginning of another.
     fn encode(&self, encoder: &mut Encoder);
 }
 
 impl Encoder {
-    /// Writes a small number, such as which variant of an enum stands here.
+    /// Writes a small number, for example the index of an enum variant.
     pub fn byte(&mut self, byte: u8) {
         self.0.push(byte);
     }
@@ -33,7 +33,7 @@ impl Encoder {
     }
 }
 
-/// Zeros of one sign: -0.0 means nothing else than 0.0.
+/// -0.0 is encoded as 0.0.
 impl Encode for f64 {
     fn encode(&self, encoder: &mut Encoder) {
         encoder.0.extend_from_slice(&(self + 0.0).to_le_bytes());
@@ -52,7 +52,7 @@ impl Encode for bool {
     }
 }
 
-/// Its length before it.
+/// The length comes first.
 impl Encode for str {
     fn encode(&self, encoder: &mut Encoder) {
         encoder.length(self.len());
@@ -60,7 +60,7 @@ impl Encode for str {
     }
 }
 
-/// Its length before it.
+/// The length comes first.
 impl<T: Encode> Encode for Vec<T> {
     fn encode(&self, encoder: &mut Encoder) {
         encoder.length(self.len());
@@ -92,7 +92,7 @@ macro_rules! encode_tuples {
     ($(($($name:ident)+))+) => {$(
         impl<$($name: Encode),+> Encode for ($($name,)+) {
             fn encode(&self, encoder: &mut Encoder) {
-                #[allow(non_snake_case, reason = "the types' names stand for their values")]
+                #[allow(non_snake_case, reason = "the values have the names of their types")]
                 let ($($name,)+) = self;
                 $($name.encode(encoder);)+
             }
@@ -102,7 +102,7 @@ macro_rules! encode_tuples {
 
 encode_tuples!((A B)(A B C)(A B C D)(A B C D E)(A B C D E F));
 
-/// Encodes structures field by field, and enums of words by their order.
+/// Encodes structures field by field, and enums of words by their index.
 macro_rules! encoded {
     ($(struct $type:ident { $($field:ident),* $(,)? })+) => {$(
         impl $crate::key::Encode for $type {
@@ -125,12 +125,13 @@ pub(crate) use encoded;
 
 encoded!(enum Format);
 
-/// A hash of everything that an answer's bytes depend on.
+/// Hash of everything that the bytes of an answer depend on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Key([u8; 32]);
 
 impl Key {
-    /// The key of what is asked for, read from a normalised document, in a form: from this build, on a processor like this one.
+    /// Makes the key of a question and the parts of a normalised document that it reads. It includes the build and the
+    /// kind of processor.
     pub fn new(asked: &str, read: &impl Encode, form: &impl Encode) -> Self {
         let mut encoder = Encoder::default();
         encoder.0.extend_from_slice(&arithmetic());
@@ -141,7 +142,7 @@ impl Key {
 
 impl std::fmt::Display for Key {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // Half of the hash is enough to tell every design ever asked for apart.
+        // Half of the hash is sufficient to distinguish all designs.
         let mut half = [0; 16];
         half.copy_from_slice(&self.0[..16]);
         write!(f, "{:032x}", u128::from_be_bytes(half))

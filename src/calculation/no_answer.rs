@@ -1,4 +1,4 @@
-//! Why there is no answer, and the one map from the solver's errors to it.
+//! The reasons for missing answers, and the one map from the solver's errors to them.
 
 use serde::Serialize;
 use toothwave_solver::drive::DriveError;
@@ -8,24 +8,24 @@ use utoipa::ToSchema;
 use crate::field::{FieldCode, FieldError};
 use crate::json::{Fault, ReadError};
 
-/// Why a document has no answer.
+/// Reason why a document has no answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoAnswer {
-    /// The kind of reason.
+    /// Kind of reason.
     pub code: NoAnswerCode,
-    /// What happened, and what to do about it.
+    /// Message: what is wrong, where, and what to do.
     pub detail: String,
-    /// Where fields are at fault: each of them, of more than a hundred the first.
+    /// The wrong fields, at most the first 100.
     pub errors: Vec<FieldError>,
 }
 
-/// So many fields at fault are named: of a list of thousands each would take a hundred times what it takes in the document.
+/// Most reported fields. An error takes a hundred times the bytes of a list entry.
 const MOST_ERRORS: usize = 100;
 
-/// So many bytes of a text are told: a name in a document may be as long as the document, and would stand in its problem many times.
+/// Most bytes of a text in a message. A name can be as long as the document, and would be repeated many times.
 const MOST_OF_A_TEXT: usize = 1000;
 
-/// Ends a text that is longer than any that is meant to be read.
+/// Shortens a text that is too long for a message.
 pub fn clip(text: &mut String) {
     if text.len() > MOST_OF_A_TEXT {
         text.truncate(text.floor_char_boundary(MOST_OF_A_TEXT));
@@ -33,41 +33,41 @@ pub fn clip(text: &mut String) {
     }
 }
 
-/// Kinds of reason, each a stable word.
+/// Kinds of reason, as stable words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoAnswerCode {
-    /// The text is no JSON.
+    /// The text is not JSON.
     MalformedJson,
-    /// JSON of another form than the design document's.
+    /// The JSON does not have the form of the document.
     InvalidDocument,
-    /// Values that no drive, load or request can have.
+    /// A value is impossible for a drive, a load or a request.
     ImpossibleDesign,
-    /// At some input angle no tooth has a lever arm.
+    /// At some input angle no tooth carries load.
     NoToothInMesh,
-    /// A `projection` whose stiffnesses give a tooth a compliance that is not positive.
+    /// With these stiffnesses the `projection` form gives a tooth a compliance that is not positive.
     ComplianceNotPositive,
-    /// A part is too full for a tooth that is to carry.
+    /// Teeth interfere with a part.
     Interference,
     /// The sweep has more states than `max_states`.
     TooManyStates,
     /// The profiles have more points than `max_profile_points`.
     TooManyPoints,
-    /// The study has more variants, or takes more bytes, than the service admits.
+    /// The study has more variants or bytes than the limits.
     TooManyVariants,
-    /// The stop signal was set.
+    /// The stop flag was set.
     Stopped,
-    /// A fault of the calculation itself; the detail says what, for whoever mends it.
+    /// Internal error of the calculation. The detail has the cause for developers.
     InternalError,
 }
 
 impl NoAnswer {
-    /// A reason without fields.
+    /// Makes a reason without fields.
     pub fn new(code: NoAnswerCode, detail: impl Into<String>) -> Self {
         Self::at_fields(code, detail, Vec::new())
     }
 
-    /// A reason in these fields.
+    /// Makes a reason with these fields.
     pub fn at_fields(code: NoAnswerCode, detail: impl Into<String>, mut errors: Vec<FieldError>) -> Self {
         for error in &mut errors {
             clip(&mut error.pointer);
@@ -78,29 +78,29 @@ impl NoAnswer {
         Self { code, detail, errors }
     }
 
-    /// The violations of a design.
+    /// Makes the reason of these violations.
     pub fn impossible(violations: &[Violation]) -> Self {
         let errors: Vec<_> = violations.iter().take(MOST_ERRORS).map(FieldError::from).collect();
         let detail = match (errors.as_slice(), violations.len()) {
             ([only], _) => format!("{}: {}", only.pointer, only.detail),
-            (_, several @ ..=MOST_ERRORS) => format!("{several} values are impossible; `errors` names each"),
-            (_, several) => format!("{several} values are impossible; `errors` names the first {MOST_ERRORS}"),
+            (_, several @ ..=MOST_ERRORS) => format!("{several} values are impossible. `errors` lists all of them"),
+            (_, several) => format!("{several} values are impossible. `errors` lists the first {MOST_ERRORS}"),
         };
         Self::at_fields(NoAnswerCode::ImpossibleDesign, detail, errors)
     }
 
-    /// The stop signal was seen.
+    /// Makes the reason of a stopped computation.
     pub fn stopped() -> Self {
         Self::new(NoAnswerCode::Stopped, "the computation was stopped")
     }
 
-    /// A fault of the calculation itself.
+    /// Makes an internal error.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
         Self::new(NoAnswerCode::InternalError, cause.to_string())
     }
 }
 
-/// For people: every field at fault where there are several.
+/// Text for people. Several fields are listed one a line.
 impl std::fmt::Display for NoAnswer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { detail, errors, .. } = self;
@@ -144,17 +144,17 @@ impl From<SolveError> for NoAnswer {
         match error {
             SolveError::NoToothInMesh { .. } => Self::new(
                 NoAnswerCode::NoToothInMesh,
-                format!("{detail}. Install more teeth, or lengthen the flank: less undercut, a smaller bore"),
+                format!("{detail}. Install more teeth, or make the flank longer: use less undercut or a smaller bore"),
             ),
             SolveError::ComplianceNotPositive { .. } => Self::new(
                 NoAnswerCode::ComplianceNotPositive,
-                format!("{detail}. Choose `virtual_work`, or stiffnesses that differ less"),
+                format!("{detail}. Use `virtual_work`, or stiffnesses that differ less"),
             ),
             SolveError::Impossible(violations) => Self::impossible(&violations),
             SolveError::Interference { .. } => Self::new(
                 NoAnswerCode::Interference,
                 format!(
-                    "{detail}: a part is too full there. Make `parts.*.clearance_um` larger, or `modification` and `deviations` smaller"
+                    "{detail}: teeth interfere with a part there. Use a larger `parts.*.clearance_um`, or smaller `modification` and `deviations`"
                 ),
             ),
             SolveError::JohnsonBeyondHalfWidth { is_of_capacity: false, .. } => {
@@ -162,26 +162,26 @@ impl From<SolveError> for NoAnswer {
             }
             SolveError::JohnsonBeyondHalfWidth { is_of_capacity: true, .. } => Self::new(
                 NoAnswerCode::ImpossibleDesign,
-                format!("{detail}. Make `load.allowable_stress_mpa` smaller, or leave it out"),
+                format!("{detail}. Use a smaller `load.allowable_stress_mpa`, or leave it out"),
             ),
             SolveError::FlatOffCarrier { .. } => Self::new(
                 NoAnswerCode::ImpossibleDesign,
-                format!("{detail}. Make the flats longer, or the carrier wider by `parts.carrier`"),
+                format!("{detail}. Use longer flats, or a wider carrier (`parts.carrier`)"),
             ),
             SolveError::NoLeverArm => Self::new(NoAnswerCode::NoToothInMesh, detail),
             SolveError::TurnedPastTeeth => Self::new(
                 NoAnswerCode::ImpossibleDesign,
                 format!(
-                    "{detail}. Lower the torque or close the gaps, or leave `wave_generator_moves` out of `model.refinements`"
+                    "{detail}. Use a lower torque or smaller gaps, or remove `wave_generator_moves` from `model.refinements`"
                 ),
             ),
             SolveError::TooManyPoints { points, limit } => {
-                let detail = format!("{detail} by `max_profile_points`; widen the chord tolerance");
+                let detail = format!("{detail} by `max_profile_points`. Use a larger chord tolerance");
                 let pointer = "/profile/chord_tolerance_mm";
                 too_many(NoAnswerCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, Some(points), limit)
             }
             SolveError::TooManyStates { limit } => {
-                let detail = format!("{detail} by `max_states`; widen the tolerance");
+                let detail = format!("{detail} by `max_states`. Use a larger tolerance");
                 let pointer = "/sweep/tolerance";
                 too_many(NoAnswerCode::TooManyStates, FieldCode::TooManyStates, pointer, &detail, None, limit)
             }
@@ -192,7 +192,7 @@ impl From<SolveError> for NoAnswer {
     }
 }
 
-/// The reason of a request that is larger than a limit, which it names with its own value, where that is known.
+/// Makes the reason of a request above a limit. The error has the requested value, if it is known, and the limit.
 #[expect(clippy::cast_precision_loss, reason = "counts far below 2^53")]
 pub(crate) fn too_many(
     code: NoAnswerCode,

@@ -36,6 +36,7 @@ pub mod duty;
 pub mod losses;
 pub mod model_error;
 pub mod peak;
+pub mod peaks_only;
 mod plots;
 
 /// The checked parameters of a sweep.

@@ -1,7 +1,8 @@
 //! toothwave: the calculation service for discrete-tooth harmonic drives.
 //!
-//! A request walks one way: bytes, document, key, cache, checked parameters, answer, bytes. This crate is HTTP and the command line.
-//! Documents and answers are in `toothwave_calculation`, every formula is in `toothwave_solver`.
+//! A request takes one path: bytes, document, key, cache, checked parameters, answer, bytes. Bytes that were seen before
+//! lead to their key at once. This crate contains HTTP
+//! and the command line. `toothwave_calculation` contains documents and answers, and `toothwave_solver` the formulas.
 
 pub mod app;
 pub mod cli;

@@ -1,9 +1,9 @@
-//! The approach of a tooth along `F_H` as a function of that force (docs/theory.md sections 4.3 to 4.5).
+//! Approach of a tooth along `F_H` as a function of that force (docs/explanation/theory.md sections 4.3 to 4.5).
 
 use crate::root::{NotConverged, ValueAndSlope, newton_from_below};
 
-/// The sum of a tooth's three approaches, each with its weight, over `F_H`: nothing at no force, increasing, and straight or bent downwards,
-/// so that the force grows with the approach ever faster. Every search above relies on these three.
+/// Weighted sum of a tooth's three approaches over `F_H`. It is zero at zero force, increasing, and linear or concave,
+/// so the force grows ever faster with the approach. All searches rely on these properties.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Approach {
     /// `ξ = c F`.
@@ -11,7 +11,7 @@ pub enum Approach {
         /// `c`.
         compliance_mm_per_n: f64,
     },
-    /// `ξ = c F^p + l F` with `p < 1`; the linear part is that of contacts or series compliances of another law.
+    /// `ξ = c F^p + l F` with `p < 1`. The linear part is that of contacts or series compliances with a linear law.
     Power {
         /// `p`.
         exponent: f64,
@@ -22,12 +22,13 @@ pub enum Approach {
     },
     /// `ξ = F (A + B ln(F_r/F))`.
     Logarithmic(Logarithmic),
-    /// The same of a tooth that a corner of the ring is pressed against.
+    /// The same with the contact of a tooth at a corner of the ring.
     Corner(Corner),
 }
 
-/// `ξ = F (A + B ln(F_r/F) + K ln(2/u - 1))`, `1/u = z + √(1 + z²)`, `z² = F_z/F`: u is how wide the contact with a corner is, over how wide one with a smooth
-/// surface would be. The last part is increasing and bent downwards as the others are (docs/theory.md section 4.4, `corner_contact`).
+/// `ξ = F (A + B ln(F_r/F) + K ln(2/u - 1))`, `1/u = z + √(1 + z²)`, `z² = F_z/F`. Here u is the width of the contact
+/// with a corner over that with a smooth surface. The last term is increasing and concave like the others
+/// (docs/explanation/theory.md section 4.4, `corner_contact`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
     smooth: Logarithmic,
@@ -37,8 +38,8 @@ pub struct Corner {
     narrowing_n: f64,
 }
 
-/// `ξ = F (A + B ln(F_r/F))` up to the force at which the law ends. Beyond, it goes on along its tangent: no answer stands there, but
-/// a search may pass through.
+/// `ξ = F (A + B ln(F_r/F))` up to the force at which the law ends. Beyond, it continues along its tangent: no result
+/// is there, but a search may pass through.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Logarithmic {
     /// `A`.
@@ -47,33 +48,33 @@ pub struct Logarithmic {
     growth_mm_per_n: f64,
     /// `F_r`.
     reference_n: f64,
-    /// Where the law ends, `F_r` times [`Logarithmic::LIMIT`].
+    /// Force at which the law ends, `F_r` times [`Logarithmic::LIMIT`].
     limit_n: f64,
-    /// The approach there.
+    /// Approach at that force.
     limit_mm: f64,
 }
 
-/// A force, and how the approach goes by its power there.
+/// A force, and the local exponent of the approach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForceAndExponent {
-    /// The force.
+    /// Force, in N.
     pub force_n: f64,
     /// `d ln ξ/d ln F`.
     pub exponent: f64,
 }
 
 impl Logarithmic {
-    /// The part of the reference force at which the law ends: half the width that the reference stands for.
+    /// Force at the law's end over the reference force, which corresponds to half the reference width.
     pub const LIMIT: f64 = 0.25;
 
-    /// `A`, `B` and `F_r`, for which `A + B (ln 4 - 1) > 0`: the slope stays positive up to the limit.
+    /// Builds the law from `A`, `B` and `F_r` with `A + B (ln 4 - 1) > 0`: the slope stays positive up to the limit.
     pub fn new(compliance_mm_per_n: f64, growth_mm_per_n: f64, reference_n: f64) -> Self {
         let limit_n = Self::LIMIT * reference_n;
         let limit_mm = limit_n * (compliance_mm_per_n + growth_mm_per_n * -Self::LIMIT.ln());
         Self { compliance_mm_per_n, growth_mm_per_n, reference_n, limit_n, limit_mm }
     }
 
-    /// `dξ/dF` at the limit and beyond.
+    /// Returns `dξ/dF` at the limit and beyond.
     fn limit_slope_mm_per_n(&self) -> f64 {
         self.compliance_mm_per_n + self.growth_mm_per_n * (-Self::LIMIT.ln() - 1.0)
     }
@@ -94,9 +95,9 @@ impl Logarithmic {
         }
     }
 
-    /// With `w = A/B + ln(F_r/F)` the law reads `ξ = B F w`, that is `w - ln w = A/B + ln(B F_r/ξ)`: the lower branch of Lambert's function,
-    /// for `w > 1` increasing and bent upwards, so that Newton's method comes down to its root after one step. The force `ξ/(B w)` keeps the
-    /// relative digits of w.
+    /// With `w = A/B + ln(F_r/F)` the law is `ξ = B F w`, that is `w - ln w = A/B + ln(B F_r/ξ)`, the lower branch of
+    /// Lambert's function. For `w > 1` it is increasing and convex, so Newton's method approaches the root from above
+    /// after one step. The force `ξ/(B w)` keeps the relative digits of w.
     fn force(&self, approach_mm: f64) -> Result<ForceAndExponent, NotConverged> {
         const CAP: u32 = 50;
         if approach_mm >= self.limit_mm {
@@ -111,7 +112,7 @@ impl Logarithmic {
         for _ in 0..CAP {
             let step = (w - w.ln() - right) * w / (w - 1.0);
             w -= step;
-            // Quadratic: the next step would be the square of this one over w.
+            // Quadratic convergence: the next step would be the square of this one over w.
             if step.abs() <= 1e-9 * w {
                 return Ok(ForceAndExponent {
                     force_n: approach_mm / (self.growth_mm_per_n * w),
@@ -124,17 +125,17 @@ impl Logarithmic {
 }
 
 impl Corner {
-    /// That whose contact on a smooth surface gives way so.
+    /// Builds the law from that of the same contact on a smooth surface.
     pub(crate) const fn new(smooth: Logarithmic, growth_mm_per_n: f64, narrowing_n: f64) -> Self {
         Self { smooth, growth_mm_per_n, narrowing_n }
     }
 
-    /// `ξ` and `dξ/dF`.
+    /// Returns `ξ` and `dξ/dF`.
     fn approach(&self, force_n: f64) -> ValueAndSlope {
         let z = (self.narrowing_n / force_n).sqrt();
         let root = 1.0_f64.hypot(z);
         let u = 1.0 / (z + root);
-        // 2/u - 1 without a difference of near numbers.
+        // 2/u - 1 without a difference of nearly equal numbers.
         let ln = (2.0 * z + 2.0 * z * (z / (root + 1.0))).ln_1p();
         ValueAndSlope {
             value: self.smooth.approach_mm(force_n) + self.growth_mm_per_n * (force_n * ln),
@@ -147,9 +148,10 @@ impl Corner {
     }
 
     fn force(&self, approach_mm: f64) -> Result<ForceAndExponent, NotConverged> {
-        /// The corner gives way a few dozen times as much as the smooth surface at most.
+        /// The corner's compliance is at most a few dozen times that of the smooth surface.
         const LEAST_SHARE: f64 = 1e-3;
-        // The lighter the force, the more it moves: so much of a force that surely is lighter makes one that is still too light.
+        // Lighter forces have more compliance, so scaling a force that is certainly too light gives one that is still
+        // too light.
         let light_n = LEAST_SHARE * self.smooth.force(approach_mm)?.force_n;
         let start_n = light_n * (approach_mm / self.approach(light_n).value);
         let force_n = newton_from_below("force at a corner", start_n, |force_n| {
@@ -161,7 +163,7 @@ impl Corner {
 }
 
 impl Approach {
-    /// `ξ` under a force.
+    /// Returns `ξ` under a force.
     pub fn approach_mm(&self, force_n: f64) -> f64 {
         match self {
             Self::Linear { compliance_mm_per_n } => compliance_mm_per_n * force_n,
@@ -173,10 +175,10 @@ impl Approach {
         }
     }
 
-    /// The force that makes an approach: the inverse of [`Self::approach_mm`].
+    /// Returns the force that makes an approach: the inverse of [`Self::approach_mm`].
     ///
     /// # Errors
-    /// [`NotConverged`], where there is no closed form.
+    /// [`NotConverged`], if there is no closed form.
     pub fn force(&self, approach_mm: f64) -> Result<ForceAndExponent, NotConverged> {
         match self {
             Self::Linear { compliance_mm_per_n } => {
@@ -184,7 +186,7 @@ impl Approach {
             }
             &Self::Power { exponent, coefficient, compliance_mm_per_n } => {
                 let alone_n = (approach_mm / coefficient).powf(1.0 / exponent);
-                // Where the linear part is nothing beside the other, so is its share in the force.
+                // If the linear part is negligible, so is its share in the force.
                 if compliance_mm_per_n * alone_n <= 0.0 {
                     return Ok(ForceAndExponent { force_n: alone_n, exponent });
                 }
@@ -208,7 +210,7 @@ impl Approach {
         }
     }
 
-    /// The approach at which the law ends; without end for most.
+    /// Returns the approach at which the law ends; infinite for most laws.
     pub fn limit_mm(&self) -> f64 {
         match self {
             Self::Linear { .. } | Self::Power { .. } => f64::INFINITY,
@@ -217,8 +219,8 @@ impl Approach {
         }
     }
 
-    /// The least of what it is made of, under 1 N. Below zero it falls under some force, however light or heavy, and the approach is none of
-    /// those that this type is for.
+    /// Returns the least coefficient of its parts, under 1 N. If it is negative, the approach falls at some force, and
+    /// this type does not apply.
     pub(crate) fn least_part_mm(&self) -> f64 {
         match *self {
             Self::Power { coefficient, compliance_mm_per_n, .. } if compliance_mm_per_n >= 0.0 => coefficient,
@@ -229,7 +231,7 @@ impl Approach {
         }
     }
 
-    /// The exponent of a law that is a single power.
+    /// Returns the exponent of a law that is a single power.
     pub(crate) fn single_exponent(&self) -> Option<f64> {
         match *self {
             Self::Linear { .. } => Some(1.0),

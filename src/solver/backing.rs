@@ -1,5 +1,5 @@
 //! What gives way behind the contacts, estimated from the parts as they are made: numbers for `series_compliance_mm_per_n`
-//! (docs/theory.md section 4.10). They are estimates: what joins the fingers, what holds the rim and what the cam sits on is the designer's.
+//! (docs/explanation/theory.md section 4.10). They are estimates: what joins the fingers, what holds the rim and what the cam sits on is the designer's.
 
 use std::f64::consts::PI;
 
@@ -341,7 +341,7 @@ impl Shares {
     }
 }
 
-/// A contact's own approach over its force, by the logarithmic law (docs/theory.md section 4.3).
+/// A contact's own approach over its force, by the logarithmic law (docs/explanation/theory.md section 4.3).
 fn line_compliance_mm_per_n(
     drive: &Drive,
     materials: &Materials,

@@ -1,15 +1,15 @@
-//! The three contacts of a tooth: materials, stiffness, Hertz stress (docs/theory.md sections 4 and 5).
+//! The three contacts of a tooth: materials, stiffness, Hertz stress (docs/explanation/theory.md sections 4 and 5).
 
 use std::f64::consts::PI;
 
-/// A part with a material of its own.
+/// A part with its own material.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Part {
-    /// The elliptic cam.
+    /// The cam.
     WaveGenerator,
     /// The discrete teeth.
     Teeth,
-    /// The rigid internal wheel.
+    /// The rigid internal gear.
     Ring,
     /// The slotted annulus.
     Carrier,
@@ -27,7 +27,7 @@ pub enum Contact {
 }
 
 impl Contact {
-    /// The part that teeth touch there.
+    /// Returns the part that teeth touch there.
     pub const fn mate(self) -> Part {
         match self {
             Self::WaveGenerator => Part::WaveGenerator,
@@ -36,7 +36,7 @@ impl Contact {
         }
     }
 
-    /// In words.
+    /// Returns the name in words.
     pub const fn name(self) -> &'static str {
         match self {
             Self::WaveGenerator => "the wave generator",
@@ -58,7 +58,7 @@ pub struct PerContact<T> {
 }
 
 impl<T> PerContact<T> {
-    /// The same function of each contact.
+    /// Builds the values by a function of each contact.
     pub fn of(mut function: impl FnMut(Contact) -> T) -> Self {
         Self {
             wave_generator: function(Contact::WaveGenerator),
@@ -67,10 +67,10 @@ impl<T> PerContact<T> {
         }
     }
 
-    /// The same fallible function of each contact.
+    /// Builds the values by a fallible function of each contact.
     ///
     /// # Errors
-    /// The first one's.
+    /// The first error of the function.
     pub fn try_of<E>(mut function: impl FnMut(Contact) -> Result<T, E>) -> Result<Self, E> {
         Ok(Self {
             wave_generator: function(Contact::WaveGenerator)?,
@@ -79,7 +79,7 @@ impl<T> PerContact<T> {
         })
     }
 
-    /// The value at one contact, to be changed.
+    /// Returns a mutable reference to the value at one contact.
     pub const fn get_mut(&mut self, contact: Contact) -> &mut T {
         match contact {
             Contact::WaveGenerator => &mut self.wave_generator,
@@ -88,7 +88,7 @@ impl<T> PerContact<T> {
         }
     }
 
-    /// The value at one contact.
+    /// Returns the value at one contact.
     pub const fn get(&self, contact: Contact) -> &T {
         match contact {
             Contact::WaveGenerator => &self.wave_generator,
@@ -97,7 +97,7 @@ impl<T> PerContact<T> {
         }
     }
 
-    /// The contacts with their values.
+    /// Returns the contacts with their values.
     pub fn iter(&self) -> impl Iterator<Item = (Contact, &T)> {
         [(Contact::WaveGenerator, &self.wave_generator), (Contact::Ring, &self.ring), (Contact::Carrier, &self.carrier)]
             .into_iter()
@@ -107,37 +107,37 @@ impl<T> PerContact<T> {
 /// An isotropic elastic material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
-    /// Young's modulus E.
+    /// Young's modulus E, in GPa.
     pub youngs_modulus_gpa: f64,
     /// Poisson's ratio ν.
     pub poissons_ratio: f64,
 }
 
 impl Material {
-    /// Steel as the paper has it.
+    /// Steel as in the paper.
     pub const STEEL: Self = Self { youngs_modulus_gpa: 210.0, poissons_ratio: 0.3 };
 
-    /// `(1 - ν²)/E`, in 1/MPa.
+    /// Returns `(1 - ν²)/E`, in 1/MPa.
     pub(crate) fn compliance_per_mpa(&self) -> f64 {
         (1.0 - self.poissons_ratio) * (1.0 + self.poissons_ratio) / (1e3 * self.youngs_modulus_gpa)
     }
 }
 
-/// The materials of all parts.
+/// Materials of all parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Materials {
-    /// Of the wave generator.
+    /// Material of the wave generator.
     pub wave_generator: Material,
-    /// Of the teeth.
+    /// Material of the teeth.
     pub teeth: Material,
-    /// Of the ring.
+    /// Material of the ring.
     pub ring: Material,
-    /// Of the carrier.
+    /// Material of the carrier.
     pub carrier: Material,
 }
 
 impl Materials {
-    /// The parts with their materials.
+    /// Returns the parts with their materials.
     pub fn iter(&self) -> impl Iterator<Item = (Part, &Material)> {
         [
             (Part::WaveGenerator, &self.wave_generator),
@@ -148,12 +148,12 @@ impl Materials {
         .into_iter()
     }
 
-    /// The contact modulus E* of a contact: `1/E* = (1 - ν1²)/E1 + (1 - ν2²)/E2`.
+    /// Returns the contact modulus E* of a contact: `1/E* = (1 - ν1²)/E1 + (1 - ν2²)/E2`.
     pub fn contact_modulus_mpa(&self, contact: Contact) -> f64 {
         1.0 / (self.teeth.compliance_per_mpa() + self.partner(contact).compliance_per_mpa())
     }
 
-    /// The material that a tooth touches at a contact.
+    /// Returns the material that a tooth touches at a contact.
     pub(crate) const fn partner(&self, contact: Contact) -> &Material {
         match contact {
             Contact::WaveGenerator => &self.wave_generator,
@@ -163,17 +163,17 @@ impl Materials {
     }
 }
 
-/// How force and approach of a contact go together.
+/// Contact law: relation of force and approach of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ContactLaw {
     /// `F = k δ` \[7\] with `k = π L1 E*/2`, of two parallel cylinders in line contact (Yang and Sun 1985).
     Linear,
-    /// `F = k δ` with stiffnesses that the designer gives, in N/mm.
+    /// `F = k δ` with given stiffnesses, in N/mm.
     Fixed(PerContact<f64>),
     /// Palmgren's `δ = 3.84e-5 F^0.9/L^0.8` (steel on steel, N and mm).
     Palmgren,
-    /// The logarithmic approach of a cylinder between two bodies (K. L. Johnson, *Contact Mechanics*, 1985, section 5.6), each of which stands still
-    /// at a depth, by default the tooth's radius.
+    /// The logarithmic approach of a cylinder between two bodies (K. L. Johnson, *Contact Mechanics*, 1985, section
+    /// 5.6). Each body is fixed at a depth, by default the tooth's radius.
     Johnson {
         /// Depth of each body below its contact, in mm.
         depth_mm: PerContact<Option<f64>>,
@@ -189,37 +189,38 @@ pub struct HertzLine {
 }
 
 impl HertzLine {
-    /// Of a contact, for teeth of this width.
+    /// Builds the law of a contact, for teeth of this width.
     pub fn new(materials: &Materials, contact: Contact, tooth_width_mm: f64) -> Self {
         let modulus = materials.contact_modulus_mpa(contact);
         Self { modulus_per_width_mpa_per_mm: modulus / (PI * tooth_width_mm) }
     }
 
-    /// `E*/(π L1)`.
+    /// Returns `E*/(π L1)`.
     pub(crate) const fn modulus_per_width_mpa_per_mm(&self) -> f64 {
         self.modulus_per_width_mpa_per_mm
     }
 
-    /// The largest pressure under `force_n`, for bodies whose curvatures (convex positive) sum to `curvature_per_mm`.
+    /// Returns the largest pressure under `force_n`, for curvatures (convex positive) that sum to `curvature_per_mm`.
     pub fn stress_mpa(&self, force_n: f64, curvature_per_mm: f64) -> f64 {
         (force_n * curvature_per_mm * self.modulus_per_width_mpa_per_mm).sqrt()
     }
 
-    /// The force that makes the largest pressure `stress_mpa`: the inverse of [`Self::stress_mpa`].
+    /// Returns the force that makes the largest pressure `stress_mpa`: the inverse of [`Self::stress_mpa`].
     pub fn force_n(&self, stress_mpa: f64, curvature_per_mm: f64) -> f64 {
         stress_mpa * (stress_mpa / (curvature_per_mm * self.modulus_per_width_mpa_per_mm))
     }
 }
 
-/// Half the width of a line contact, `2F/(π L1 σ)`.
+/// Returns half the width of a line contact, `2F/(π L1 σ)`; 0 without a stress.
 pub fn half_width_mm(force_n: f64, stress_mpa: f64, tooth_width_mm: f64) -> f64 {
-    // At a corner a force is borne of which no stress is told.
+    // At a corner there is a force but no calculated stress.
     if stress_mpa > 0.0 { 2.0 * force_n / (PI * tooth_width_mm * stress_mpa) } else { 0.0 }
 }
 
-/// The largest shear stress below a line contact, over its largest pressure: `τ/σ = ζ - ζ²/√(1 + ζ²)` at the depth ζ in half-widths,
-/// with its maximum at `ζ² = (√5 - 1)/2` (in the plane of the section, where it does not depend on Poisson's ratio).
+/// Largest shear stress below a line contact, over its largest pressure: `τ/σ = ζ - ζ²/√(1 + ζ²)` at the depth ζ in
+/// half-widths. The maximum is at `ζ² = (√5 - 1)/2`, in the plane of the section, where Poisson's ratio has no
+/// influence.
 pub const SHEAR_SHARE: f64 = 0.300_283_106_000_777_6;
 
-/// The depth of that shear stress in half-widths, `√((√5 - 1)/2)`.
+/// Depth of that shear stress in half-widths, `√((√5 - 1)/2)`.
 pub const SHEAR_DEPTH: f64 = 0.786_151_377_757_423_3;

@@ -1,5 +1,5 @@
 //! The parts' sections in the plane, as outlines of lines, arcs and sampled curves, and where each stands in the assembly
-//! (docs/theory.md section 8).
+//! (docs/explanation/theory.md section 8).
 
 use std::f64::consts::PI;
 
@@ -304,7 +304,7 @@ impl Drawing {
     /// Where the prisms of a part stand: in the ring's frame for an assembly, in its own otherwise.
     ///
     /// The carrier turns by `j (Z_G - Z_K)/Z_G` and tooth i stands in slot i, at `ψ_i = i 2π/Z'_G - j Z_K/Z_G` from the first lobe
-    /// (docs/theory.md section 3).
+    /// (docs/explanation/theory.md section 3).
     fn placements(&self, part: Part) -> Result<Vec<Placement>, SolveError> {
         let p = self.drive.parameters();
         let input_turns = match self.subject {
@@ -415,7 +415,7 @@ fn tooth_section(tooth: &ToothPart) -> Section {
 }
 
 /// The finger between slots 0 and 1 of the carrier that fills the annulus which the mechanics leave it: from the cam's major axis to
-/// the ring's tips, with slots as wide as a tooth (docs/theory.md sections 7 and 8). None where nothing is left.
+/// the ring's tips, with slots as wide as a tooth (docs/explanation/theory.md sections 7 and 8). None where nothing is left.
 pub fn widest_finger(drive: &Drive) -> Option<Vec<Edge>> {
     CarrierPart::widest(drive).map(|carrier| finger(drive, &carrier))
 }

@@ -1,4 +1,4 @@
-//! A drive whose parameters were checked once, so that nothing below doubts its input.
+//! Drive with checked parameters, so that the functions below need not doubt their input.
 
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
@@ -10,26 +10,26 @@ use crate::ring::{FlankLimit, RingFlank, RingTooth};
 use crate::root::{NotConverged, bracketed};
 use crate::violation::{Alternatives, Parameter, Violation};
 
-/// What describes a drive (docs/theory.md section 1).
+/// Parameters of a drive (docs/explanation/theory.md section 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveParameters {
-    /// What pushes the teeth outward.
+    /// Wave generator, which pushes the teeth outward.
     pub wave_generator: WaveGenerator,
-    /// `Z_G`: teeth in theory.
+    /// `Z_G`: theoretical number of teeth.
     pub teeth: i64,
-    /// `Z'_G`: installed teeth; only they have a slot.
+    /// `Z'_G`: number of installed teeth. Only they have a slot.
     pub installed: i64,
     /// `r`: radius of a tooth.
     pub tooth_radius_mm: f64,
-    /// What a tooth is besides its radius.
+    /// Shape of a tooth, in addition to its radius.
     pub tooth: ToothShape,
-    /// `Z_K`: teeth of the ring.
+    /// `Z_K`: number of ring teeth.
     pub ring_teeth: i64,
     /// Radius of a bore that truncates the ring's teeth.
     pub tip_radius_mm: Option<f64>,
 }
 
-/// The shape of a tooth of the radius `r` (docs/theory.md section 2.10).
+/// Shape of a tooth of radius `r` (docs/explanation/theory.md section 2.10).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ToothShape {
     /// A cylinder along the axis.
@@ -37,7 +37,7 @@ pub enum ToothShape {
         /// `L1`: width along the axis.
         width_mm: f64,
     },
-    /// A ball, in grooves where their radii are given.
+    /// A ball, which runs in grooves if their radii are given.
     Ball {
         /// Radius of the groove in each part.
         groove_radius_mm: PerContact<Option<f64>>,
@@ -52,7 +52,7 @@ pub enum ToothShape {
 }
 
 impl ToothShape {
-    /// What is given, each with the range that it has to lie in.
+    /// Returns the given values, each with the parameter that defines its range.
     pub(crate) fn parameters(&self) -> Vec<(Parameter, f64)> {
         match self {
             Self::Cylinder { width_mm } => vec![(Parameter::ToothWidth, *width_mm)],
@@ -66,7 +66,7 @@ impl ToothShape {
         }
     }
 
-    /// Why no tooth of this radius has the shape, as far as its parameters are in their ranges.
+    /// Returns the reasons why no tooth of this radius has the shape. Values outside their ranges are skipped.
     fn violations(&self, tooth_radius_mm: f64) -> Vec<Violation> {
         match self {
             Self::Cylinder { .. } => Vec::new(),
@@ -96,7 +96,7 @@ impl ToothShape {
         }
     }
 
-    /// Half the width across the slot: `r`, between flats `√(r² - l²/4)`.
+    /// Returns half the tooth's width across the slot: `r`, between flats `√(r² - l²/4)`.
     pub fn half_width_in_slot_mm(&self, tooth_radius_mm: f64) -> f64 {
         match self {
             Self::Cylinder { .. } | Self::Ball { .. } => tooth_radius_mm,
@@ -115,22 +115,22 @@ pub struct Drive {
     ring: RingTooth,
 }
 
-/// Why there is no [`Drive`].
+/// Reason why there is no [`Drive`].
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DriveError {
-    /// Every impossible value.
+    /// All impossible values.
     #[error("the drive cannot exist")]
     Impossible(Vec<Violation>),
-    /// A geometric iteration hit its cap.
+    /// A geometric iteration reached its limit of steps.
     #[error(transparent)]
     NotConverged(#[from] NotConverged),
 }
 
 impl Drive {
-    /// Checks the parameters.
+    /// Checks the parameters and builds the drive.
     ///
     /// # Errors
-    /// Every reason why the drive cannot exist.
+    /// Returns every reason why the drive cannot exist.
     pub fn new(parameters: &DriveParameters) -> Result<Self, DriveError> {
         let draft = Draft::new(parameters)?;
         draft.drive().ok_or(DriveError::Impossible(draft.violations))
@@ -141,12 +141,12 @@ impl Drive {
         &self.parameters
     }
 
-    /// `U`: lobes of the wave generator.
+    /// Returns `U`, the number of lobes of the wave generator.
     pub fn lobes(&self) -> u32 {
         self.ring.flank.locus().lobes()
     }
 
-    /// Extent of a tooth along the axis: `L1`, a ball's diameter.
+    /// Returns the extent of a tooth along the axis: `L1`, or a ball's diameter.
     pub fn tooth_width_mm(&self) -> f64 {
         match self.parameters.tooth {
             ToothShape::Cylinder { width_mm } | ToothShape::FlatSided { width_mm, .. } => width_mm,
@@ -154,68 +154,68 @@ impl Drive {
         }
     }
 
-    /// Half the width of a slot without clearance.
+    /// Returns half the width of a slot without clearance.
     pub fn slot_half_width_mm(&self) -> f64 {
         self.parameters.tooth.half_width_in_slot_mm(self.parameters.tooth_radius_mm)
     }
 
-    /// The cam's largest distance from the axis, from where on the carrier can begin.
+    /// Returns the cam's largest distance from the axis, which is the smallest possible inner radius of the carrier.
     pub fn cam_outer_radius_mm(&self) -> f64 {
         self.ring.flank.locus().cam_outer_radius_mm()
     }
 
-    /// The ring's flank; through it the path of the teeth and the wave generator.
+    /// Returns the ring's flank, which contains the path of the teeth and the wave generator.
     pub const fn flank(&self) -> &RingFlank {
         &self.ring.flank
     }
 
-    /// One tooth of the ring.
+    /// Returns one tooth of the ring.
     pub const fn ring_tooth(&self) -> &RingTooth {
         &self.ring
     }
 
-    /// Where and why the flank ends towards the tip.
+    /// Returns the end of the flank towards the tip, and its cause.
     pub const fn flank_limit(&self) -> &FlankLimit {
         &self.ring.limit
     }
 
-    /// `s = sign(Z_G - Z_K)`.
+    /// Returns `s = sign(Z_G - Z_K)`.
     pub const fn sense(&self) -> f64 {
         if self.parameters.teeth > self.parameters.ring_teeth { 1.0 } else { -1.0 }
     }
 
-    /// `Z_G / U`: carrier torque over input torque.
+    /// Returns `Z_G / U`: carrier torque over input torque.
     pub fn teeth_per_wave(&self) -> f64 {
         self.parameters.teeth as f64 / f64::from(self.lobes())
     }
 
-    /// `i_HG = Z_G/(Z_G - Z_K)`: input speed over carrier speed, ring fixed.
+    /// Returns `i_HG = Z_G/(Z_G - Z_K)`: input speed over carrier speed, ring fixed.
     pub fn transmission_ratio(&self) -> f64 {
         self.sense() * self.teeth_per_wave()
     }
 
-    /// `i_HK = -Z_K/(Z_G - Z_K)`: input speed over ring speed, carrier fixed.
+    /// Returns `i_HK = -Z_K/(Z_G - Z_K)`: input speed over ring speed, carrier fixed.
     pub fn transmission_ratio_carrier_fixed(&self) -> f64 {
         -self.sense() * self.ring.flank.teeth_per_wave()
     }
 
-    /// Radius of the ring at the middle of its tooth space, `d_l + r`.
+    /// Returns the radius of the ring at the middle of its tooth space, `d_l + r`.
     pub fn root_radius_mm(&self) -> f64 {
         self.ring.flank.root_radius_mm()
     }
 
-    /// Radius of the ring's tips before any bore.
+    /// Returns the radius of the ring's tips before any bore.
     pub const fn natural_tip_radius_mm(&self) -> f64 {
         self.ring.natural_tip_radius_mm
     }
 
-    /// Radius of the ring's tips: natural, trimmed by undercut, or bored.
+    /// Returns the radius of the ring's tips: natural, trimmed by undercut, or bored.
     pub const fn tip_radius_mm(&self) -> f64 {
         self.ring.tip_radius_mm
     }
 
-    /// The engaged tooth with the largest pressure angles: at the steepest place of the path, or where the flank ends
-    /// before it.
+    /// Returns the engaged tooth with the largest pressure angles. It is at the steepest point of the path, or at the
+    /// end of the flank if that comes first.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -223,7 +223,7 @@ impl Drive {
         self.ring.steepest_engaged()
     }
 
-    /// Largest pressure angle β of the engaged flank.
+    /// Returns the largest pressure angle β of the engaged flank.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -235,7 +235,7 @@ impl Drive {
         Neighbours { locus: *self.ring.flank.locus(), installed: self.parameters.installed }
     }
 
-    /// Least distance of two neighbouring centres on their path.
+    /// Returns the least distance of two neighbouring centres on their path.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -243,13 +243,14 @@ impl Drive {
         self.neighbours().least_center_distance_mm()
     }
 
-    /// `d` at any angle from a lobe.
+    /// Returns `d` at any angle from a lobe.
     pub(crate) fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
         self.ring.flank.locus().center_radius_at_mm(angle_rad)
     }
 
-    /// Thickness of the wall between two neighbouring slots where it is thinnest, at the carrier's inner edge on
-    /// the circle of the cam's outer radius `a`: `2 (√(a² - w²) sin(π/Z'_G) - w cos(π/Z'_G))`, w half the slot's width; not positive where the slots run into each other there.
+    /// Returns the least thickness of the wall between two neighbouring slots. It is at the carrier's inner edge, on
+    /// the circle of the cam's outer radius `a`: `2 (√(a² - w²) sin(π/Z'_G) - w cos(π/Z'_G))`, with w half the slot's
+    /// width. The result is not positive if the slots overlap there.
     pub fn slot_wall_mm(&self) -> f64 {
         let (a, r) = (self.cam_outer_radius_mm(), self.slot_half_width_mm());
         let (sin, cos) = self.neighbours().half_spacing_rad().sin_cos();
@@ -257,22 +258,22 @@ impl Drive {
     }
 }
 
-/// Parameters of which some may be impossible. Whatever can be checked is checked as soon as the values that it itself needs are possible:
-/// one impossible value hides no other.
+/// Parameters of which some may be impossible. Each check runs as soon as the values that it needs are possible, so one
+/// impossible value hides no other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
     parameters: DriveParameters,
     violations: Vec<Violation>,
-    /// The cam's largest and least distance from the axis.
+    /// Largest and least distance of the cam from the axis.
     pub(crate) cam_outer_mm: Option<f64>,
     pub(crate) cam_inner_mm: Option<f64>,
-    /// How far the cam can be set back.
+    /// Largest possible inward offset of the cam.
     pub(crate) greatest_set_back_mm: Option<f64>,
     pub(crate) installed: Option<i64>,
     pub(crate) tooth_radius_mm: Option<f64>,
     /// Half the width of a slot.
     pub(crate) slot_half_width_mm: Option<f64>,
-    /// `s`, where carrier and ring differ by a tooth for each lobe.
+    /// `s`, if carrier and ring differ by one tooth for each lobe.
     pub(crate) sense: Option<f64>,
     pub(crate) ring: Option<RingTooth>,
 }
@@ -301,7 +302,7 @@ impl Draft {
         let ring_teeth = are_in_range(&[(Parameter::RingTeeth, p.ring_teeth as f64)]).then_some(p.ring_teeth);
         let mut bore_is_possible = p.tip_radius_mm.is_none_or(|bore| is_in_range(Parameter::TipRadius, bore));
 
-        // A cam of which the path is given follows from the teeth; every other one is what it is without them.
+        // A cam defined by its path depends on the teeth. Any other cam is known without them.
         let cam_tooth_radius_mm = tooth_radius_mm.or((!p.wave_generator.follows_from_teeth()).then_some(0.0));
         let mut cam = None;
         if let Some((wave_generator, radius_mm)) = wave_generator.zip(cam_tooth_radius_mm) {
@@ -311,7 +312,7 @@ impl Draft {
             }
         }
         let (cam_outer_mm, cam_inner_mm) = match p.wave_generator {
-            // Of an ellipse each is known by itself.
+            // The semi-axes of an ellipse are known independently of each other.
             WaveGenerator::Ellipse { semi_major_mm, semi_minor_mm } => {
                 let in_range = |parameter: Parameter, value| parameter.check(value).is_none().then_some(value);
                 (in_range(Parameter::SemiMajor, semi_major_mm), in_range(Parameter::SemiMinor, semi_minor_mm))
@@ -338,7 +339,7 @@ impl Draft {
         let mut slot_half_width_mm = None;
         if let Some(tooth_radius_mm) = tooth_radius_mm {
             violations.extend(p.tooth.violations(tooth_radius_mm));
-            // No number where the flats leave nothing of the tooth.
+            // None if the flats leave nothing of the tooth.
             slot_half_width_mm =
                 Some(p.tooth.half_width_in_slot_mm(tooth_radius_mm)).filter(|&width_mm| width_mm > 0.0);
         }
@@ -366,7 +367,7 @@ impl Draft {
                 let (parameter, value_mm) = p.wave_generator.stroke();
                 let limit_mm = match p.wave_generator {
                     WaveGenerator::Ellipse { .. } => tip_radius_mm,
-                    // At a regular tip, where it lies farthest in, the ring leaves room where e < r.
+                    // At a regular tip, where the ring is farthest in, the carrier has space if e < r.
                     _ => p.tooth_radius_mm,
                 };
                 violations.push(Violation::NoCarrierAnnulus {
@@ -395,17 +396,17 @@ impl Draft {
         })
     }
 
-    /// Every reason why the drive cannot exist.
+    /// Returns every reason why the drive cannot exist.
     pub fn violations(&self) -> &[Violation] {
         &self.violations
     }
 
-    /// Whether its teeth have flats.
+    /// Returns true if the teeth have flats.
     pub(crate) const fn has_flats(&self) -> bool {
         matches!(self.parameters.tooth, ToothShape::FlatSided { .. })
     }
 
-    /// The drive, where it can exist.
+    /// Returns the drive if it can exist.
     pub fn drive(&self) -> Option<Drive> {
         let ring = self.ring.filter(|_| self.violations.is_empty())?;
         Some(Drive { parameters: self.parameters, ring })
@@ -420,18 +421,18 @@ struct Neighbours {
 }
 
 impl Neighbours {
-    /// Half the angle between neighbouring slots.
+    /// Returns half the angle between neighbouring slots.
     fn half_spacing_rad(&self) -> f64 {
         PI / self.installed as f64
     }
 
-    /// The radius up to which teeth are apart, because no centre comes nearer to the axis than in the valley. This bound settles nearly
-    /// every drive.
+    /// Returns the tooth radius below which neighbouring teeth cannot touch. It follows from the least centre radius,
+    /// in the valley. This bound settles nearly every drive.
     fn surely_free_radius_mm(&self) -> f64 {
         self.locus.cam().kind().surely_free_radius_mm(self.half_spacing_rad().sin())
     }
 
-    /// That they touch, where they do.
+    /// Returns a violation if neighbouring teeth touch.
     fn violation(&self) -> Result<Option<Violation>, NotConverged> {
         let tooth_radius_mm = self.locus.tooth_radius_mm();
         if tooth_radius_mm < self.surely_free_radius_mm() {
@@ -446,9 +447,9 @@ impl Neighbours {
         Ok(Some(Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm }))
     }
 
-    /// Least distance of two neighbouring centres on their path (docs/theory.md section 7): around an ellipse of those either side of the
-    /// minor axis; of two teeth or three, which are more than a right angle apart, of those either side of the major axis, since these are
-    /// nearer to the minor one.
+    /// Returns the least distance of two neighbouring centres on their path (docs/explanation/theory.md section 7). On
+    /// an ellipse it is that of the pair across the minor axis. With two or three teeth, which are more than a right
+    /// angle apart, the pair across the major axis is closer to the minor axis.
     fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {
         if !matches!(self.locus.cam(), Cam::Ellipse(_)) {
             return self.least_scanned_distance_mm();
@@ -458,8 +459,8 @@ impl Neighbours {
         Ok(2.0 * half_rad.sin() * self.locus.at(nearest)?.center_radius_mm)
     }
 
-    /// The same around any cam: over the middle of the pair a scan,
-    /// then a golden-section search around its least value. The pair that straddles the valley is one of the scan.
+    /// Returns the least distance of two neighbouring centres around any cam. It scans the middle of the pair, then
+    /// runs a golden-section search around the least value. The scan includes the pair across the valley.
     fn least_scanned_distance_mm(&self) -> Result<f64, NotConverged> {
         const SCAN: u32 = 96;
         let half = self.half_spacing_rad();
@@ -480,7 +481,7 @@ impl Neighbours {
         }
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let (mut low, mut high) = (best.0 - step, best.0 + step);
-        // Forty steps shrink the bracket by 4e-9: a minimum is then known to all digits.
+        // Forty steps shrink the bracket by 4e-9, which gives the minimum to all digits.
         for _ in 0..40 {
             let (left, right) = (high - golden * (high - low), low + golden * (high - low));
             let (at_left, at_right) = (distance(left)?, distance(right)?);
@@ -490,9 +491,10 @@ impl Neighbours {
         Ok(best.1)
     }
 
-    /// The radius, at most the one that the teeth have, at which they begin to touch: thicker teeth stand farther out, but by less than they
-    /// are thicker, so that the gap falls with the radius. Its logarithm is what is solved for, because radii range over twelve decades. Where
-    /// the path itself is given it is the same for all radii, and what the centres leave is half their least distance.
+    /// Returns the radius, at most that of the teeth, at which neighbours begin to touch. Centres of thicker teeth are
+    /// farther out, but by less than the increase in thickness, so the gap falls with the radius. The unknown is the
+    /// radius's logarithm, because radii range over twelve decades. If the path itself is given, it is the same for all
+    /// radii, and the result is half the least distance.
     fn touching_radius_mm(&self, center_distance_mm: f64) -> Result<f64, NotConverged> {
         match self.locus.cam() {
             Cam::Ellipse(cam) if self.installed > 3 => return self.touching_radius_of_ellipse_mm(cam),
@@ -510,18 +512,19 @@ impl Neighbours {
         Ok(at(exponent).locus.tooth_radius_mm())
     }
 
-    /// Of an ellipse the radius at which the two teeth either side of the minor axis touch it, and so each other, of four teeth or more.
+    /// Returns, for an ellipse and four teeth or more, the radius at which the two teeth across the minor axis touch.
     ///
-    /// Their centres then stand at `(r, r cot μ)`, μ half the spacing, and on the path of section 2.2: with `a² cos φ/h = r (1 - cos φ)` and
-    /// `b² sin φ/h = r (cot μ - sin φ)` the normal's angle is the one root of `a² cos φ (cot μ - sin φ) = b² sin φ (1 - cos φ)`, beyond 45°.
+    /// Both touch the minor axis then. Their centres are at `(r, r cot μ)`, with μ half the spacing, and on the path of
+    /// section 2.2. With `a² cos φ/h = r (1 - cos φ)` and `b² sin φ/h = r (cot μ - sin φ)` the normal's angle is the
+    /// one root of `a² cos φ (cot μ - sin φ) = b² sin φ (1 - cos φ)` above 45°.
     fn touching_radius_of_ellipse_mm(&self, cam: &Ellipse) -> Result<f64, NotConverged> {
         let (a, b) = (cam.semi_major_mm(), cam.semi_minor_mm());
         let half_rad = self.half_spacing_rad();
-        // cot μ - 1 and, below, 1 - sin φ and 1 - cos φ, without a difference of near values.
+        // cot μ - 1 and, below, 1 - sin φ and 1 - cos φ, without a difference of nearly equal values.
         let beyond_one =
             SQRT_2 * (PI * (self.installed - 4) as f64 / (4 * self.installed) as f64).sin() / half_rad.sin();
         let flattening_squared = (b / a) * (b / a);
-        // In the logarithm of tan φ, which reaches from 1 to some (a/b)² cot μ.
+        // The unknown is the logarithm of tan φ. Tan φ ranges from 1 to about (a/b)² cot μ.
         let direction = |logarithm: f64| {
             let tan = logarithm.exp();
             let cos = 1.0 / (1.0 + tan * tan).sqrt();

@@ -1,4 +1,4 @@
-//! What a designer should be told about a drive that can exist (docs/findings.md).
+//! What a designer should be told about a drive that can exist (docs/reference/findings.md).
 
 use std::f64::consts::PI;
 
@@ -38,7 +38,7 @@ pub const WIND_UP_SHARE_OF_PERIOD: f64 = 0.1;
 pub const WIND_UP_TIMES_LOBES_RAD: f64 = 0.25;
 
 /// A ring pressure angle beyond this is reported where approaches are projected: between the drives that were held against elastic bodies,
-/// at 22.8° the largest force comes out 2 % too large at most, at 34.8° 8 %, at 46.7° 15 % (docs/validation.md).
+/// at 22.8° the largest force comes out 2 % too large at most, at 34.8° 8 %, at 46.7° 15 % (docs/explanation/validation.md).
 pub const STEEP_FOR_PROJECTION_DEG: f64 = 30.0;
 
 /// An efficiency that may be further off than this is reported.
@@ -48,7 +48,7 @@ pub const UNCERTAIN_EFFICIENCY: f64 = 0.05;
 pub const LIFE_HOLDS_TO_SHARE_OF_RATING: f64 = 0.5;
 
 /// A part behind a contact that adds more than this to what a tooth gives way at its contacts is reported: the wind-up is then a sixth too small, as much
-/// as elastic bodies in a housing were found to add together (docs/validation.md).
+/// as elastic bodies in a housing were found to add together (docs/explanation/validation.md).
 pub const SOFT_BACKING_SHARE: f64 = 0.2;
 
 /// A ball's groove, of whose depth the document says nothing, is taken to be this share of the ball's radius deep: a rule of thumb.
@@ -412,7 +412,7 @@ pub fn of_wind_up(drive: &Drive, load: &LoadCase, sweep: &Sweep) -> Option<Findi
     (wind_up_deg > limit_deg).then_some(Finding::WindUpBeyondModel { wind_up_deg, limit_deg, is_moving })
 }
 
-/// How far first order holds for the friction of a sweep with this mean loss ratio (docs/theory.md section 10.6).
+/// How far first order holds for the friction of a sweep with this mean loss ratio (docs/explanation/theory.md section 10.6).
 pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) -> Option<Finding> {
     let FirstOrderError { efficiency, coefficient, coefficient_along_cam, is_within_measured_range } =
         friction.first_order_error(mechanism, mechanism.loss_share(Fixed::Ring, loss_ratio));
@@ -427,13 +427,13 @@ pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) 
         .then_some(Finding::EfficiencyUncertain { error: efficiency, limit: UNCERTAIN_EFFICIENCY })
 }
 
-/// That the load on a bearing of this rating goes beyond what the equation of its life holds for (docs/theory.md section 10.5).
+/// That the load on a bearing of this rating goes beyond what the equation of its life holds for (docs/explanation/theory.md section 10.5).
 pub fn of_bearing(dynamic_load_rating_n: f64, load_n: f64) -> Option<Finding> {
     let limit_n = LIFE_HOLDS_TO_SHARE_OF_RATING * dynamic_load_rating_n;
     (load_n > limit_n).then_some(Finding::BearingLoadAboveHalfRating { load_n, limit_n })
 }
 
-/// The findings about the ring as it is made (docs/theory.md section 8).
+/// The findings about the ring as it is made (docs/explanation/theory.md section 8).
 pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
     let flank = ring.space.set_back_flank();
     let mut findings = thin_wall(drive, Wall::RingRim, ring.outer_radius_mm - ring.space.outermost_radius_mm());

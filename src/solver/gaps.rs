@@ -1,4 +1,4 @@
-//! Gaps at a tooth's three contacts: what parts that were modified, or came out a little off, leave free (docs/theory.md section 4.8). Each opens a gap where
+//! Gaps at a tooth's three contacts: what parts that were modified, or came out a little off, leave free (docs/explanation/theory.md section 4.8). Each opens a gap where
 //! it is positive; all are exact to first order in their size, and add up.
 
 use std::f64::consts::PI;
@@ -134,7 +134,7 @@ impl Deviations {
     }
 
     /// The mesh of a drive with these deviations, over a sweep of as many load periods as it takes until the items that deviate meet again as
-    /// they did (docs/theory.md section 4.8).
+    /// they did (docs/explanation/theory.md section 4.8).
     pub fn mesh(&self, drive: &Drive) -> Mesh {
         if self.is_nil() {
             return Mesh::new(drive);
@@ -297,7 +297,7 @@ impl Usual {
     }
 }
 
-/// How far flanks and walls are turned away about the axis: lost motion alone (docs/theory.md section 4.8).
+/// How far flanks and walls are turned away about the axis: lost motion alone (docs/explanation/theory.md section 4.8).
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Turned {
     ring_rad: f64,

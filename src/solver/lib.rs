@@ -1,35 +1,36 @@
 //! Geometry, load sharing and contact stress of discrete-tooth harmonic drives.
 //!
-//! The crate is arithmetic alone: pure functions, no input or output, no clock, no logging. The equations, with
-//! their sources, stand in `docs/theory.md`; every formula below names its section there, and in brackets the
-//! number it has in the paper (Wang, Bai, Chen, Wang, Journal of Chongqing University 36(1), 2013, 35-42).
+//! The crate consists of pure functions: no input or output, no clock, no logging. The file
+//! `docs/explanation/theory.md` derives the equations. Every formula below names its section there. A number in
+//! brackets is the number of an equation in the paper (Wang, Bai, Chen, Wang, Journal of Chongqing University 36(1),
+//! 2013, 35-42).
 //!
 //! # Parts
 //!
-//! A *wave generator* of U lobes (input) pushes *teeth* outward in the radial slots of a *carrier*
-//! (output). A fixed *ring*, whose profile is the envelope of the moving teeth, deflects them sideways.
+//! A *wave generator* with U lobes (the input) pushes *teeth* outward in the radial slots of a *carrier* (the output).
+//! A fixed *ring*, whose profile is the envelope of the moving teeth, deflects them sideways.
 //!
 //! # Frames and signs
 //!
-//! - Wave generator's frame: x along the middle of a lobe, the major axis of an ellipse. A tooth's *position* ψ is the polar angle of its
-//!   centre from the lobe that it is on: 0 in the middle of the lobe (root of the ring's tooth space), π/U in the valley (tip of the
-//!   ring's tooth).
-//! - Ring's frame: x along the middle of a tooth space; the tooth's centre stands at the angle `-s ψ/k`, `k = Z_K / U`,
-//!   `s = sign(Z_G - Z_K)`. The profile is symmetric, and is drawn with ψ/k.
-//! - Near the tip everything is worked from `x = π/U - ψ`, which a [`Position`] carries beside ψ, because cos(π/2)
-//!   is 6e-17 in doubles and would enter stresses through a square root.
-//! - Where U divides the number of installed teeth the meshing zones are alike: sums are over one of them, torques over all. Elsewhere
-//!   the teeth of all zones are listed.
+//! - Wave generator's frame: x points along the middle of a lobe, which is the major axis of an ellipse. A tooth's
+//!   *position* ψ is the polar angle of its centre from the nearest lobe. It is 0 in the middle of the lobe (root of
+//!   the ring's tooth space) and π/U in the valley (tip of the ring's tooth).
+//! - Ring's frame: x points along the middle of a tooth space. The tooth's centre has the angle `-s ψ/k`, `k = Z_K /
+//!   U`, `s = sign(Z_G - Z_K)`. The profile is symmetric and is drawn with ψ/k.
+//! - Near the tip all formulas use `x = π/U - ψ`, which a [`Position`] stores next to ψ. In doubles cos(π/2) is 6e-17,
+//!   and would enter stresses through a square root.
+//! - If U divides the number of installed teeth, the meshing zones are alike: sums are over one of them, torques over
+//!   all. Otherwise the teeth of all zones are listed.
 //!
 //! # Units
 //!
-//! Lengths in mm, forces in N, stresses and moduli in MPa, torques in N·m at the border and N·mm inside, angles in
-//! radians inside and in degrees where a name ends in `_deg`.
+//! Lengths are in mm, forces in N, stresses and moduli in MPa. Torques are in N·m in the public interface and in N·mm
+//! inside. Angles are in radians inside, and in degrees if a name ends in `_deg`.
 //!
-//! # The way through
+//! # Usage
 //!
-//! [`Drive::new`] checks parameters once and reports every reason why a drive cannot exist. A [`Drive`] answers for
-//! its geometry and its mesh; with a [`LoadCase`] it answers a [`sweep()`](sweep::sweep) over one period.
+//! [`Drive::new`] checks the parameters once and reports every reason why a drive cannot exist. A [`Drive`] computes
+//! its geometry and its mesh. With a [`LoadCase`] it computes a [`sweep()`](sweep::sweep) over one period.
 
 pub mod approach;
 mod arcs;
@@ -69,119 +70,119 @@ use mesh::Place;
 pub use position::Position;
 pub use violation::{Parameter, Violation};
 
-/// The version that answers carry, since a later one may compute the last digits differently.
+/// Version of this crate, which answers include because a later version may compute the last digits differently.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Why a drive that can exist has no answer to a question.
+/// Reason why a valid drive has no answer to a question.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
-    /// At some input angle no tooth has a lever arm: ψ_e is at most the spacing of the places where teeth stand.
+    /// At some input angle no tooth has a lever arm: ψ_e is at most the spacing of the installed teeth.
     #[error(
         "the ring's flank ends at {engagement_start_deg} deg from the middle of a lobe, within one spacing of the teeth ({spacing_deg} deg): at some input angle no tooth has a lever arm, so no finite force carries the torque"
     )]
     NoToothInMesh {
-        /// Where the flank ends, ψ_e.
+        /// End of the flank, ψ_e.
         engagement_start_deg: f64,
         /// Angle between neighbouring installed teeth.
         spacing_deg: f64,
     },
-    /// `projection` with these stiffnesses gives a tooth a compliance that is not positive.
+    /// With these stiffnesses the form `projection` gives a tooth a compliance that is not positive.
     #[error(
         "the projected compliance of a tooth at {position_deg} deg is {compliance_mm_per_n} mm/N, not above zero: with these stiffnesses the projection form has no solution with physical meaning"
     )]
     ComplianceNotPositive {
-        /// Where on the flank the compliance is least.
+        /// Position on the flank with the least compliance.
         position_deg: f64,
         /// The least compliance.
         compliance_mm_per_n: f64,
     },
-    /// A load that this drive cannot have.
+    /// The load is impossible for this drive.
     #[error("the load is impossible for this drive")]
     Impossible(Vec<Violation>),
     /// None of the teeth at an input angle has a lever arm.
     #[error("none of the teeth in mesh has a lever arm, so no finite force carries the torque")]
     NoLeverArm,
-    /// The wave generator moves on under its teeth, past all of them, before they carry the torque.
+    /// The wave generator rotates past all its teeth before they carry the torque.
     #[error("the wave generator would turn past its teeth before gaps are closed and the torque is carried")]
     TurnedPastTeeth,
-    /// Johnson's law where a contact is half as wide as the tooth's radius or the depth, or wider.
+    /// Johnson's law is invalid: the half-width of a contact reaches half of the tooth's radius or of the depth.
     #[error(
         "{of_capacity}half the contact's width at {} reaches {half_width_limit_mm} mm, half of the tooth's radius or of the depth, where Johnson's approach ends: at this input angle with an input torque of {input_torque_limit_nm} N·m, first on the tooth at {position_deg} deg",
         .contact.name(),
         of_capacity = if *.is_of_capacity { "no torque capacity can be told, as before any contact reaches its allowable stress " } else { "" }
     )]
     JohnsonBeyondHalfWidth {
-        /// The contact that is first.
+        /// The contact that reaches the limit first.
         contact: Contact,
-        /// Where its tooth stands.
+        /// Position of its tooth.
         position_deg: f64,
-        /// The half-width at which the law ends.
+        /// Half-width at which the law ends.
         half_width_limit_mm: f64,
-        /// The input torque at which it does so, at the input angle looked at.
+        /// Input torque at this half-width, at the input angle in question.
         input_torque_limit_nm: f64,
-        /// Whether it is the torque capacity that lies beyond, and not the load.
+        /// True if the torque capacity is beyond the limit, false if the load is.
         is_of_capacity: bool,
     },
-    /// A part that is too full: before any load a tooth would be pressed already.
+    /// Interference: a tooth is pressed without any load.
     #[error(
         "interference: {tooth} {position_deg} deg from the middle of its lobe{at} has a total gap of {gap_um} µm along the wave generator's force",
         tooth = .place.map_or_else(|| "a tooth".to_owned(), |place| format!("the tooth in slot {} on lobe {},", place.slot, place.lobe)),
         at = .input_angle_deg.map_or_else(String::new, |input_angle_deg| format!(", at an input angle of {input_angle_deg} deg,"))
     )]
     Interference {
-        /// Where the tooth is among the items, where these deviate.
+        /// Place of the tooth, if parts deviate individually.
         place: Option<Place>,
-        /// Where it stands on its lobe.
+        /// Position of the tooth on its lobe.
         position_deg: f64,
-        /// The input angle, where one is looked at.
+        /// Input angle, if one is known.
         input_angle_deg: Option<f64>,
-        /// Its total gap along `F_H`, below zero.
+        /// Total gap along `F_H`, below zero.
         gap_um: f64,
     },
-    /// A flat-sided tooth that is nowhere borne by the carrier.
+    /// A flat-sided tooth has no contact with the carrier's slot walls.
     #[error(
         "the flat of the tooth at {position_deg} deg, its centre {center_radius_mm} mm from the axis, lies outside the carrier"
     )]
     FlatOffCarrier {
-        /// Where it stands.
+        /// Position of the tooth.
         position_deg: f64,
         /// Distance of its centre from the axis.
         center_radius_mm: f64,
     },
-    /// More points than asked for at most.
+    /// The profiles need more points than the limit.
     #[error("the profiles need {points} points or more at this chord tolerance, beyond the {limit} allowed")]
     TooManyPoints {
-        /// Points that the profiles need, or as many of them as were counted.
+        /// Number of points that the profiles need, or the number counted so far.
         points: u64,
-        /// The limit that was given.
+        /// Limit given by the caller.
         limit: u64,
     },
-    /// More states than asked for at most.
+    /// The sweep needs more states than the limit.
     #[error(
         "the sweep takes more states at this tolerance (input angles times teeth in mesh) than the {limit} allowed"
     )]
     TooManyStates {
-        /// The limit that was given.
+        /// Limit given by the caller.
         limit: u64,
     },
-    /// The answer's own checks say that it is wrong: a fault of this crate.
+    /// The answer fails its own checks: a bug in this crate.
     #[error("the {check} of the sweep is off by {residual:e}")]
     Inconsistent {
-        /// Which check.
+        /// Name of the check.
         check: &'static str,
-        /// What it came to.
+        /// Residual of the check.
         residual: f64,
     },
-    /// The caller's stop signal was seen.
+    /// The stop signal of the caller was set.
     #[error("the computation was stopped")]
     Stopped,
-    /// An iteration hit its cap.
+    /// An iteration reached its limit of steps.
     #[error(transparent)]
     NotConverged(#[from] root::NotConverged),
 }
 
 impl SolveError {
-    /// The same, of teeth that were looked at at an input angle.
+    /// Returns the error with this input angle, if it carries one.
     pub(crate) fn at_input_angle(self, input_angle_deg: f64) -> Self {
         match self {
             Self::Interference { place, position_deg, gap_um, .. } => {
@@ -192,14 +193,14 @@ impl SolveError {
     }
 }
 
-/// Asked now and then whether to go on; a computation that is told to stop returns [`SolveError::Stopped`].
-/// It is asked through `dyn`, so that a sweep is compiled once, in this crate.
+/// Stop signal, polled during a computation. If it is set, the computation returns [`SolveError::Stopped`]. It is
+/// passed as `dyn`, so that a sweep is compiled once, in this crate.
 pub trait Stop {
-    /// Whether to stop.
+    /// Returns true if the computation has to stop.
     fn stopped(&self) -> bool;
 }
 
-/// Never stops.
+/// Stop signal that is never set.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Never;
 

@@ -1,4 +1,4 @@
-//! Equilibrium of a tooth and compatibility of all of them at one input angle (docs/theory.md section 4).
+//! Equilibrium of a tooth, and compatibility of all teeth at one input angle (docs/explanation/theory.md section 4).
 
 use std::f64::consts::PI;
 
@@ -18,25 +18,25 @@ use crate::tooth::{BallContact, Contacts, CornerContact, Flat, Pressure, ToothCo
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, tooth};
 
-/// How the three approaches of a tooth add up to the rotation of the wave generator.
+/// Form of compatibility: relation of the three approaches of a tooth to the rotation of the wave generator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Compatibility {
     /// The paper's \[3\]-\[6\]: each approach projected on the direction of `F_H`.
     Projection,
-    /// Virtual work: the frictionless solution for a tooth whose centre is free to move.
+    /// Virtual work: the frictionless solution for a tooth whose centre can move freely.
     VirtualWork,
 }
 
-/// The torque that the drive transmits, ring fixed.
+/// Torque that the drive transmits, ring fixed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Torque {
     /// At the wave generator, in N·m.
     Input(f64),
-    /// At the carrier, in N·m; losses neglected.
+    /// At the carrier, in N·m, without losses.
     Output(f64),
 }
 
-/// What describes a load.
+/// Parameters of a load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadParameters {
     /// Materials of all parts.
@@ -47,31 +47,31 @@ pub struct LoadParameters {
     pub compatibility: Compatibility,
     /// The contact law.
     pub law: ContactLaw,
-    /// What stands behind each contact and gives way too, under any law, with `VirtualWork` alone.
+    /// Compliance of the supports, in series with each contact under any law. Needs `VirtualWork`.
     pub series_compliance_mm_per_n: PerContact<f64>,
-    /// Whether the ring's teeth bend, the more the nearer to their tips they are pressed, with `VirtualWork` alone; otherwise no place of the flank
-    /// gives way more than another.
+    /// True if the ring's teeth bend, more so the nearer to the tip the contact is. Needs `VirtualWork`. If false,
+    /// bending is neglected.
     pub ring_teeth_bend: bool,
-    /// Whether the wave generator moves on under its teeth as it winds up, with `VirtualWork` alone; otherwise its arms are those of the positions
-    /// without load.
+    /// True if the lever arms change as the wave generator winds up under its teeth. Needs `VirtualWork`. If false, the
+    /// arms are those of the unloaded positions.
     pub wave_generator_moves: bool,
-    /// Whether teeth before a pointed or bored flank are pressed against its corner, with `VirtualWork` alone and cylinders; otherwise the ring is rigid where
-    /// the flank ends, and they carry from there on.
+    /// True if teeth before a pointed or bored flank press against its corner. Needs `VirtualWork` and cylinders. If
+    /// false, the ring is rigid at the flank's end, and teeth carry from there on.
     pub corner_contact: bool,
     /// Gap along the normal of each contact, in µm.
     pub clearance_um: PerContact<f64>,
-    /// Parts made otherwise than conjugate, with `VirtualWork` alone.
+    /// Profile modifications: parts made with other than the conjugate shape. Need `VirtualWork`.
     pub modification: Modification,
-    /// The carrier that bears the flats of flat-sided teeth; of no other teeth is it asked.
+    /// Radii of the carrier, which supports the flats of flat-sided teeth. Used for such teeth only.
     pub carrier: CarrierRadii,
-    /// The stress that each contact may have, which the torque capacity is asked for.
+    /// Allowable stress of each contact, which sets the torque capacity.
     pub allowable_stress_mpa: Option<PerContact<f64>>,
 }
 
 impl LoadParameters {
-    /// The gaps that this drive cannot have under `projection`: those that it weighs negatively somewhere on the engaged flank,
-    /// where more gap would mean more load. Virtual work weighs none so. Of a drive only `s` and the ring are needed, of the load
-    /// the gap itself.
+    /// Returns the clearances that this drive cannot have under `projection`. Their weights are negative somewhere on
+    /// the engaged flank, so more clearance would mean more load. Virtual work has no negative weights. Only `s` and
+    /// the ring of the drive, and the clearance itself, are needed.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -80,13 +80,13 @@ impl LoadParameters {
         self.clearance_violations_in(sense, &ring)
     }
 
-    /// Why no carrier of this drive has the radii that bear flats.
+    /// Returns the reasons why the carrier cannot have the radii that support flats.
     pub fn carrier_violations(&self, draft: &Draft) -> Vec<Violation> {
         let set_forward_um = -self.modification.wave_generator_equidistant_um;
         if draft.has_flats() { self.carrier.violations(draft, set_forward_um) } else { Vec::new() }
     }
 
-    /// What of a drive's deviations cannot be, or not under this load.
+    /// Returns the deviations that are impossible for the drive or under this load.
     pub fn deviation_violations(&self, drive: &DriveParameters, deviations: &Deviations) -> Vec<Violation> {
         let mut violations = deviations.violations(drive);
         if self.compatibility == Compatibility::Projection && !deviations.is_nil() {
@@ -95,7 +95,7 @@ impl LoadParameters {
         violations
     }
 
-    /// What `projection` does not take: its weights are not those of the work done, and may be negative.
+    /// Returns the parameters that `projection` rejects: its weights are not those of virtual work and may be negative.
     fn what_needs_virtual_work(&self) -> impl Iterator<Item = Parameter> {
         let law = (!self.law.is_of_projection()).then_some(Parameter::Law);
         let series = self.series_compliance_mm_per_n.iter().filter(|&(_, &compliance)| compliance > 0.0);
@@ -113,7 +113,7 @@ impl LoadParameters {
         if self.compatibility == Compatibility::VirtualWork || gaps.is_empty() {
             return Ok(Vec::new());
         }
-        // Both weights fall with the pressure angle (or, for s = -1, one is negative throughout).
+        // Both weights fall with the pressure angle (for s = -1 one weight is negative everywhere).
         let weight = Weights::of(Compatibility::Projection, sense, &ring.flank, &ring.steepest_engaged()?).0;
         Ok(gaps
             .into_iter()
@@ -123,15 +123,15 @@ impl LoadParameters {
     }
 }
 
-/// A load that was checked.
+/// A load with checked parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadCase(LoadParameters);
 
 impl LoadCase {
-    /// Checks the parameters.
+    /// Checks the parameters and builds the load.
     ///
     /// # Errors
-    /// Every value that is out of its range.
+    /// Returns every value that is out of its range.
     pub fn new(parameters: &LoadParameters) -> Result<Self, Vec<Violation>> {
         let torque = match parameters.torque {
             Torque::Input(value) => (Parameter::InputTorque, value),
@@ -163,12 +163,13 @@ impl LoadCase {
         if violations.is_empty() { Ok(Self(*parameters)) } else { Err(violations) }
     }
 
-    /// The parameters, as given.
+    /// Returns the parameters, as given.
     pub const fn parameters(&self) -> &LoadParameters {
         &self.0
     }
 
-    /// The torque at the wave generator. Losses neglected, it is the carrier's over the absolute ratio, ring fixed.
+    /// Returns the torque at the wave generator: without losses, the carrier torque over the absolute ratio, ring
+    /// fixed.
     pub fn input_torque_nm(&self, drive: &Drive) -> f64 {
         match self.0.torque {
             Torque::Input(torque) => torque,
@@ -176,7 +177,7 @@ impl LoadCase {
         }
     }
 
-    /// The torque at the carrier.
+    /// Returns the torque at the carrier, without losses.
     pub fn output_torque_nm(&self, drive: &Drive) -> f64 {
         match self.0.torque {
             Torque::Input(torque) => torque * drive.teeth_per_wave(),
@@ -184,25 +185,26 @@ impl LoadCase {
         }
     }
 
-    /// Whether teeth of this drive are pressed against the corners of the ring's tips: cylinders where the flank ends in one.
+    /// Returns true if teeth of this drive press against the corners of the ring's tips: no balls, and a flank with a
+    /// corner.
     pub fn presses_corners(&self, drive: &Drive) -> bool {
         let is_ball = matches!(drive.parameters().tooth, ToothShape::Ball { .. });
         self.0.corner_contact && !is_ball && drive.flank_limit().end != FlankEnd::RegularTip
     }
 
-    /// The mesh of a drive with these deviations under the load.
+    /// Returns the mesh of a drive with these deviations under the load.
     pub fn mesh(&self, drive: &Drive, deviations: &Deviations) -> Mesh {
         let mesh = deviations.mesh(drive);
         if self.presses_corners(drive) { mesh.with_teeth_before_flank() } else { mesh }
     }
 
-    /// Whether any contact has a gap.
+    /// Returns true if any contact has a gap.
     pub fn has_gaps(&self) -> bool {
         self.0.clearance_um.iter().any(|(_, &gap)| gap > 0.0) || self.0.modification.first().is_some()
     }
 }
 
-/// One number where the contacts share it.
+/// Returns one value if all contacts have the same stress, otherwise one for each contact.
 fn allowable_stresses(stress_mpa: PerContact<f64>) -> Vec<(Parameter, f64)> {
     let PerContact { wave_generator, ring, carrier } = stress_mpa;
     if wave_generator.to_bits() == ring.to_bits() && ring.to_bits() == carrier.to_bits() {
@@ -212,7 +214,7 @@ fn allowable_stresses(stress_mpa: PerContact<f64>) -> Vec<(Parameter, f64)> {
     }
 }
 
-/// What an approach at each contact adds to the displacement ξ along `F_H`.
+/// Contribution of each contact's approach to the displacement ξ along `F_H`.
 struct Weights(PerContact<f64>);
 
 impl Weights {
@@ -220,7 +222,8 @@ impl Weights {
         let force_ratio = force_ratio(sense, flank, center);
         match compatibility {
             Compatibility::VirtualWork => Self(force_ratio),
-            // The paper's cos(γ + sβ) and s sin γ. With tan β = k tan γ the first, times F_K/F_H = cos γ/cos β, is 1 - (1 + sk) sin²γ.
+            // The paper's cos(γ + sβ) and s sin γ. With tan β = k tan γ the first, times F_K/F_H = cos γ/cos β, is 1 -
+            // (1 + sk) sin²γ.
             Compatibility::Projection => {
                 let t = center.tan_pressure_angle;
                 let sin_squared = t * t / (1.0 + t * t);
@@ -247,13 +250,14 @@ fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContac
     }
 }
 
-/// The same of a tooth before the flank: `F_K/F_H = cos γ/cos β`, `F_S/F_H = cos γ (tan β + s tan γ)`, β being the angle of the line to the corner. A tooth that is
-/// past the corner, or that its slot would have to pull, is none that can be pressed: nothing.
+/// Returns the force ratios of a tooth before the flank, `F_K/F_H = cos γ/cos β` and `F_S/F_H = cos γ (tan β + s tan
+/// γ)`. Here β is the angle of the line to the corner. Returns none if the tooth is past the corner, or if its slot
+/// would have to pull it.
 fn force_ratio_at_corner(sense: f64, center: &ToothCenter, seen: &FlankPoint) -> Option<PerContact<f64>> {
     let t = center.tan_pressure_angle;
     let cos_cam = 1.0 / (1.0 + t * t).sqrt();
     let carrier = cos_cam * (seen.tan_pressure_angle + sense * t);
-    // Both: a tooth that stands farther out than the corner, and past it, has a positive tangent again.
+    // Both tests are needed: a tooth farther out than the corner and past it has a positive tangent again.
     let is_before = seen.tan_pressure_angle > 0.0 && seen.cos_pressure_angle > 0.0;
     (is_before && carrier >= 0.0).then(|| PerContact {
         wave_generator: 1.0,
@@ -262,20 +266,20 @@ fn force_ratio_at_corner(sense: f64, center: &ToothCenter, seen: &FlankPoint) ->
     })
 }
 
-/// A tooth at a position, with what the load makes of it per unit of `F_H`.
+/// State of a tooth at a position: geometry, force ratios and its spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToothState {
-    /// Its centre and its contact with the cam.
+    /// Centre of the tooth and its contact with the cam.
     pub center: ToothCenter,
-    /// Its contact with the ring.
+    /// Contact with the ring.
     pub flank: FlankPoint,
     /// Forces over `F_H`.
     pub force_ratio: PerContact<f64>,
     /// Relative curvature of each contact in the plane of motion, in 1/mm.
     pub curvature_per_mm: PerContact<f64>,
-    /// What the pressure at each contact follows from.
+    /// Pressure model of each contact.
     pub pressure: PerContact<Pressure>,
-    /// What it is to the sharing of the load.
+    /// Spring of the tooth in load sharing.
     pub spring: Spring,
 }
 
@@ -285,13 +289,13 @@ impl AsRef<Spring> for ToothState {
     }
 }
 
-/// A drive under a load: everything that does not depend on the position, worked out once.
+/// A drive under a load, with everything precomputed that does not depend on the position.
 #[derive(Debug, Clone, Copy)]
 pub struct LoadedDrive<'a> {
     drive: &'a Drive,
     mesh: Mesh,
     compatibility: Compatibility,
-    /// What a sum over the teeth that are listed is multiplied by, to be that over all.
+    /// Factor from a sum over the listed teeth to the sum over all teeth.
     zones: f64,
     input_torque_nmm: f64,
     law: ContactLaw,
@@ -299,25 +303,27 @@ pub struct LoadedDrive<'a> {
     ring_bending: Option<RingBending>,
     wave_generator_moves: bool,
     tip_corner: Option<TipCorner>,
-    /// How much more the corner gives way for each unit of the logarithm by which a contact there is narrower, where the ring's teeth bend.
+    /// Growth of the corner's compliance for each unit of the logarithm by which a contact there is narrower, if the
+    /// ring's teeth bend.
     corner_growth_mm_per_n: f64,
     gaps: Gaps<'a>,
 }
 
-/// A stress that limits the torque at one input angle.
+/// Stress that limits the torque at one input angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TorqueLimit {
-    /// The torque at the wave generator under which it is reached.
+    /// Torque at the wave generator at which the stress is reached.
     pub input_torque_nmm: f64,
-    /// The contact that reaches it first; the nearest to it where none does.
+    /// The contact that reaches its stress first, or the nearest to its stress if none does.
     pub contact: Contact,
-    /// Whether no contact reaches its stress under any torque that the teeth carry: under more the wave generator would turn past them.
+    /// True if no contact reaches its stress: at a larger torque the wave generator would rotate past the teeth.
     pub turns_past_teeth: bool,
-    /// Where Johnson's law ends before any stress is reached: the torque is that of its end then, and the limit lies beyond.
+    /// End of Johnson's law, if it comes before any stress is reached. The torque is then the one at that end, and the
+    /// limit is higher.
     pub law_end: Option<LawEnd>,
 }
 
-/// Where Johnson's law ends for the teeth at one input angle.
+/// End of Johnson's law for the teeth at one input angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LawEnd {
     contact: Contact,
@@ -327,7 +333,7 @@ pub struct LawEnd {
 }
 
 impl LawEnd {
-    /// That a load, or a capacity, lies beyond.
+    /// Returns the error for a load or a torque capacity beyond this end.
     pub(crate) fn error(self, is_of_capacity: bool) -> SolveError {
         let Self { contact, position_deg, half_width_limit_mm, input_torque_limit_nmm } = self;
         let input_torque_limit_nm = 1e-3 * input_torque_limit_nmm;
@@ -342,16 +348,16 @@ impl LawEnd {
 }
 
 impl<'a> LoadedDrive<'a> {
-    /// The drive under the load.
+    /// Builds the drive under the load.
     ///
     /// # Errors
-    /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist, [`SolveError::Impossible`] where the
-    /// drive cannot have the load's clearances.
+    /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] if no finite forces exist,
+    /// [`SolveError::Impossible`] if the drive cannot have the load's clearances.
     pub fn new(drive: &'a Drive, load: &LoadCase) -> Result<Self, SolveError> {
         Self::with_deviations(drive, load, &ToothContact::of(drive, load.parameters().carrier), None)
     }
 
-    /// The drive under the load, its parts deviating.
+    /// Builds the drive under the load, with deviations of its parts.
     ///
     /// # Errors
     /// As [`Self::with_deviations`].
@@ -359,19 +365,20 @@ impl<'a> LoadedDrive<'a> {
         Self::with_deviations(drive, load, &ToothContact::of(drive, load.parameters().carrier), Some(deviations))
     }
 
-    /// The drive under the load, with teeth of another shape.
+    /// Builds the drive under the load, with teeth of another shape.
     ///
     /// # Errors
-    /// As [`Self::new`], and [`SolveError::Impossible`] under a law that such teeth do not have.
+    /// As [`Self::new`], and [`SolveError::Impossible`] if the law does not apply to such teeth.
     pub fn with_teeth(drive: &'a Drive, load: &LoadCase, shape: &ToothContact) -> Result<Self, SolveError> {
         Self::with_deviations(drive, load, shape, None)
     }
 
-    /// The drive under the load, with teeth of another shape and parts that deviate. Then zones are not alike: [`Self::wind_up`] wants the teeth
-    /// of all zones, made by [`Self::tooth_at`].
+    /// Builds the drive under the load, with teeth of another shape and deviations of its parts. Zones are then not
+    /// alike: [`Self::wind_up`] needs the teeth of all zones, made by [`Self::tooth_at`].
     ///
     /// # Errors
-    /// As [`Self::with_teeth`], and [`SolveError::Impossible`] where a list does not fit or `projection` is to take deviations.
+    /// As [`Self::with_teeth`], and [`SolveError::Impossible`] if a list has a wrong length or `projection` gets
+    /// deviations.
     pub fn with_deviations(
         drive: &'a Drive,
         load: &LoadCase,
@@ -416,63 +423,65 @@ impl<'a> LoadedDrive<'a> {
                 spacing_deg: mesh.spacing_deg(),
             });
         }
-        // Only `projection` can fall to zero, and only with unlike stiffnesses. Of cylinders and balls it is then linear in sin²γ and positive at the
-        // root, so its least value stands there or where γ is largest. That of flats changes with what the carrier bears of them too.
+        // Only `projection` can fall to zero, and only with unequal stiffnesses. For cylinders and balls it is linear
+        // in sin²γ and positive at the root, so its least value is there or at the largest γ. For flats the supported
+        // length varies too.
         if p.compatibility == Compatibility::Projection {
             loaded.state(&Place::default(), drive.steepest_engaged()?)?;
         }
         Ok(loaded)
     }
 
-    /// The same for lists in which each tooth stands for so many.
+    /// Returns the same drive for lists in which each tooth represents this many.
     pub(crate) const fn with_zones(self, zones: f64) -> Self {
         Self { zones, ..self }
     }
 
-    /// The same over the places of one zone ([`Mesh::as_one_zone`]): with one tooth at each, which stands for all that carry alike, or, where items deviate,
-    /// with every one.
+    /// Returns the same drive over the places of one zone ([`Mesh::as_one_zone`]). One tooth at each place represents
+    /// all that carry alike. If items deviate, every tooth is listed.
     pub(crate) fn as_one_zone(&self) -> Self {
         let zones = if self.mesh.tells_items_apart() { self.zones } else { self.mesh.teeth_at_each_place() };
         Self { mesh: self.mesh.as_one_zone(), zones, ..*self }
     }
 
-    /// What a sum over the teeth that are listed is multiplied by, to be that over all.
+    /// Returns the factor from a sum over the listed teeth to the sum over all teeth.
     pub(crate) const fn zones(&self) -> f64 {
         self.zones
     }
 
-    /// The drive.
+    /// Returns the drive.
     pub const fn drive(&self) -> &'a Drive {
         self.drive
     }
 
-    /// Its mesh, in which items that deviate are told apart.
+    /// Returns its mesh, in which deviating items are distinguished.
     pub const fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// The form of compatibility.
+    /// Returns the form of compatibility.
     pub const fn compatibility(&self) -> Compatibility {
         self.compatibility
     }
 
-    /// Whether the law is linear, alike everywhere, and no contact has a gap: where unit loads only have to be scaled.
+    /// Returns true if the law is linear and uniform and no contact has a gap. Unit loads then only have to be scaled.
     pub(crate) fn is_linear(&self) -> bool {
         matches!(self.tooth_law(), Some(ToothLaw::Linear { .. })) && self.flat().is_none() && self.gaps.is_nil()
     }
 
-    /// The law, for whoever works in columns; none where it is another one at each position.
+    /// Returns the law for column-wise evaluation, or none if it varies with the position.
     pub(crate) fn tooth_law(&self) -> Option<ToothLaw> {
         let is_plain = self.ring_bending.is_none() && !self.wave_generator_moves && self.tip_corner.is_none();
         self.contacts.tooth_law().filter(|_| is_plain)
     }
 
-    /// Whether teeth are listed that may carry nothing because a gap is open.
+    /// Returns true if listed teeth may carry nothing because of an open gap.
     pub(crate) fn has_gaps(&self) -> bool {
         !self.gaps.is_nil() || self.tip_corner.is_some()
     }
 
-    /// The angle by which the wave generator moves a tooth at the flank's end as far as the tooth is from the axis; nothing where no corner is pressed.
+    /// Returns the angle by which the wave generator moves a tooth at the flank's end by its distance from the axis.
+    /// Returns 0 if no corner is pressed.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -484,22 +493,22 @@ impl<'a> LoadedDrive<'a> {
         Ok(center.center_radius_mm / center.cam_contact.lever_arm_mm)
     }
 
-    /// The corner that a tooth meets first, where it stands before the flank.
+    /// Returns the corner that a tooth before the flank meets first.
     fn corner_at(&self, position: &Position) -> Option<&TipCorner> {
         self.tip_corner.as_ref().filter(|corner| corner.is_before_flank(position))
     }
 
-    /// A contact of balls, for whoever works in columns.
+    /// Returns a ball contact for column-wise evaluation.
     pub(crate) fn ball(&self, contact: Contact) -> Option<BallContact> {
         self.contacts.ball(contact)
     }
 
-    /// The flat of flat-sided teeth, for whoever works in columns.
+    /// Returns the flat of flat-sided teeth for column-wise evaluation.
     pub(crate) fn flat(&self) -> Option<Flat> {
         self.contacts.flat()
     }
 
-    /// The centre of a tooth, and the curvature of each of its contacts in the plane of motion, at a position.
+    /// Returns the centre of a tooth at a position, and the curvature of each of its contacts in the plane of motion.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -511,42 +520,42 @@ impl<'a> LoadedDrive<'a> {
         Ok((center, self.curvature_per_mm(&center, &self.drive.flank().at(&center))))
     }
 
-    /// The gaps.
+    /// Returns the gaps.
     pub(crate) const fn gaps(&self) -> &Gaps<'a> {
         &self.gaps
     }
 
-    /// What the pressure at a contact of a tooth follows from, at a position.
+    /// Returns the pressure model of a contact of a tooth at a position.
     ///
     /// # Errors
-    /// As [`Self::tooth`], but for gaps.
+    /// As [`Self::tooth`], except for gaps.
     pub(crate) fn pressure_at(&self, position: Position, contact: Contact) -> Result<Pressure, SolveError> {
         let (center, curvature_per_mm) = self.center_and_curvatures(position)?;
         self.pressure(contact, &center, *curvature_per_mm.get(contact))
     }
 
-    /// Hertz stress of a contact.
+    /// Returns the Hertz stress law of a contact.
     pub(crate) const fn hertz(&self, contact: Contact) -> &HertzLine {
         self.contacts.hertz(contact)
     }
 
-    /// `M0` in N·mm.
+    /// Returns `M0` in N·mm.
     pub const fn input_torque_nmm(&self) -> f64 {
         self.input_torque_nmm
     }
 
-    /// The tooth at a position.
+    /// Returns the tooth at a position.
     ///
     /// # Errors
-    /// [`NotConverged`] from the path, [`SolveError::FlatOffCarrier`] where a flat-sided tooth has left its slot.
+    /// [`NotConverged`] from the path, [`SolveError::FlatOffCarrier`] if a flat-sided tooth has left its slot.
     pub fn tooth(&self, position: Position) -> Result<ToothState, SolveError> {
         self.tooth_at(&Place::default(), position)
     }
 
-    /// The tooth at a position, in its place among the items that may deviate.
+    /// Returns the tooth at a position, in its place among items that may deviate.
     ///
     /// # Errors
-    /// As [`Self::tooth`], and [`SolveError::Interference`] where a part is too full.
+    /// As [`Self::tooth`], and [`SolveError::Interference`] if a tooth is pressed without load.
     pub fn tooth_at(&self, place: &Place, position: Position) -> Result<ToothState, SolveError> {
         let locus = self.drive.flank().locus();
         self.state(place, locus.at(position)?)
@@ -571,7 +580,7 @@ impl<'a> LoadedDrive<'a> {
                 pressure: self.pressure(contact, &center, *curvature_per_mm.get(contact))?,
             })
         })?;
-        // Without friction the way that the wave generator makes and the torque that it takes have one arm.
+        // Without friction, displacement and torque of the wave generator have the same lever arm.
         let arm_mm = center.cam_contact.lever_arm_mm;
         let usually_turned = self.gaps.usually_turned(center.center_radius_mm);
         let gap = if self.gaps.is_nil() && corner.is_none() {
@@ -582,7 +591,7 @@ impl<'a> LoadedDrive<'a> {
             let mut gaps_mm = self.gaps.besides_turns(place, &center, &flank);
             let mut turned = self.gaps.turned_at(place);
             if self.wave_generator_moves || corner.is_some() {
-                // Where the gap has no weight too, in the valley.
+                // This also holds in the valley, where the gap has no weight.
                 turned = turned.and_aside(std::mem::take(&mut gaps_mm.carrier), center.center_radius_mm);
             }
             if let Some(corner) = corner {
@@ -593,7 +602,7 @@ impl<'a> LoadedDrive<'a> {
             let along_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * gaps_mm.get(contact));
             let lost_motion_rad = turned.lost_motion_rad(self.drive);
             Some(match self.compatibility {
-                // The weights of clearances were looked at before: what is below zero of them is rounding.
+                // Weights of clearances were checked before; a negative sum is rounding.
                 Compatibility::Projection => Gap { along_mm: along_mm.max(0.0), lost_motion_rad },
                 Compatibility::VirtualWork => {
                     let gap_mm = along_mm + (lost_motion_rad + self.lost_motion_rad()) * arm_mm;
@@ -618,15 +627,16 @@ impl<'a> LoadedDrive<'a> {
             }
         }
         let decline_mm_per_rad = self.arm_decline_mm_per_rad(&center);
-        // The tooth comes to its place on the flank as the wave generator has made up for what is usual, and has the arm of that place then.
+        // The tooth reaches this place on the flank after the common lost motion, and has its lever arm then.
         let usual_rad = usually_turned.lost_motion_rad(self.drive);
         let spring = Spring::new(arm_mm, usual_rad, decline_mm_per_rad, gap, approach);
         let pressure = PerContact::of(|contact| places.get(contact).pressure);
         Ok(ToothState { center, flank, force_ratio, curvature_per_mm, pressure, spring })
     }
 
-    /// How much shorter the arm of a tooth becomes for each radian that the wave generator moves on under it: that of `d tan γ cos γ`, γ in the
-    /// cosine staying, by the position (docs/theory.md section 4.4).
+    /// Returns the decrease of a tooth's lever arm for each radian of wind-up of the wave generator. It is the
+    /// derivative of `d tan γ cos γ` by the position, with γ in the cosine constant (docs/explanation/theory.md section
+    /// 4.4).
     fn arm_decline_mm_per_rad(&self, center: &ToothCenter) -> f64 {
         if !self.wave_generator_moves {
             return 0.0;
@@ -635,8 +645,9 @@ impl<'a> LoadedDrive<'a> {
         (tan_pressure_angle_derivative - t * t) * center_radius_mm / (1.0 + t * t).sqrt()
     }
 
-    /// What a tooth before the flank loses by flanks and walls that are turned away by so much more than is usual, along `F_H` and beyond the lost motion that one on the
-    /// flank would have: there the ring's force has k times the arm of `F_H`, here another.
+    /// Returns the extra gap along `F_H` of a tooth before the flank, if flanks and walls are rotated by more than the
+    /// common angle. On the flank the ring's force has k times the arm of `F_H`; here it has another, so the lost
+    /// motion differs.
     fn beyond_lost_motion_mm(&self, turned_rad: f64, center: &ToothCenter, seen: &FlankPoint) -> f64 {
         let t = center.tan_pressure_angle;
         let ring_arm_mm = center.center_radius_mm * seen.tan_pressure_angle / (1.0 + t * t).sqrt();
@@ -644,7 +655,7 @@ impl<'a> LoadedDrive<'a> {
         turned_rad * (ring_arm_mm - of_flank_mm)
     }
 
-    /// Relative curvature of each contact of a tooth in the plane of motion.
+    /// Returns the relative curvature of each contact of a tooth in the plane of motion.
     fn curvature_per_mm(&self, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
         let r = self.drive.parameters().tooth_radius_mm;
         PerContact {
@@ -654,7 +665,7 @@ impl<'a> LoadedDrive<'a> {
         }
     }
 
-    /// What the pressure at a contact of a tooth follows from.
+    /// Returns the pressure model of a contact of a tooth.
     fn pressure(&self, contact: Contact, center: &ToothCenter, curvature_per_mm: f64) -> Result<Pressure, SolveError> {
         if let (Contact::Ring, Some(corner)) = (contact, self.corner_at(&center.position)) {
             return Ok(Pressure::Corner(CornerContact {
@@ -665,7 +676,7 @@ impl<'a> LoadedDrive<'a> {
         }
         let center_radius_mm = center.center_radius_mm;
         let pressure = self.contacts.pressure(contact, curvature_per_mm, center_radius_mm)?;
-        // Before the flank nothing presses such a tooth.
+        // Before the flank such a tooth carries no load.
         let unpressed = || self.corner_at(&center.position).and(self.flat()).map(|flat| Pressure::Flat(flat.whole()));
         pressure.or_else(unpressed).ok_or_else(|| {
             let position_deg = center.position.from_lobe_deg();
@@ -673,16 +684,16 @@ impl<'a> LoadedDrive<'a> {
         })
     }
 
-    /// Whether a tooth's flat lies outside its slot's walls.
+    /// Returns true if a tooth's flat lies outside its slot's walls.
     fn has_left_slot(&self, center: &ToothCenter) -> bool {
         self.flat().is_some_and(|flat| flat.borne_mm(center.center_radius_mm) <= 0.0)
     }
 
-    /// The pressure at the middle of each contact of a tooth, summed along its way over the part: what wears it (docs/theory.md
-    /// section 10.4).
+    /// Returns the pressure at the middle of each contact of a tooth, integrated along its path over the part. Wear
+    /// follows from it (docs/explanation/theory.md section 10.4).
     ///
     /// # Errors
-    /// [`NotConverged`] from the ellipse, [`SolveError::FlatOffCarrier`] where a flat-sided tooth has left its slot.
+    /// [`NotConverged`] from the ellipse, [`SolveError::FlatOffCarrier`] if a flat-sided tooth has left its slot.
     pub(crate) fn line_load_n_per_mm(
         &self,
         center: &ToothCenter,
@@ -697,7 +708,7 @@ impl<'a> LoadedDrive<'a> {
         })
     }
 
-    /// The forces on a tooth when the wave generator has turned by `Δφ`; none where a gap is still open.
+    /// Returns the forces on a tooth after the wave generator has rotated by `Δφ`; zero if a gap is still open.
     ///
     /// # Errors
     /// [`NotConverged`] from the law's inverse.
@@ -706,7 +717,7 @@ impl<'a> LoadedDrive<'a> {
         Ok(PerContact::of(|contact| cam_force_n * tooth.force_ratio.get(contact)))
     }
 
-    /// The three forces and the three stresses on a tooth when the wave generator has turned by `Δφ`.
+    /// Returns the three forces and the three stresses on a tooth after the wave generator has rotated by `Δφ`.
     pub(crate) fn loads(&self, tooth: &ToothState, wind_up: &WindUp) -> Result<[f64; 6], NotConverged> {
         let force_n = self.forces_n(tooth, wind_up)?;
         let stress_mpa = self.stress_mpa(tooth, &force_n);
@@ -720,20 +731,20 @@ impl<'a> LoadedDrive<'a> {
         ])
     }
 
-    /// The Hertz stresses under the forces on a tooth.
+    /// Returns the Hertz stresses under the forces on a tooth.
     pub fn stress_mpa(&self, tooth: &ToothState, force_n: &PerContact<f64>) -> PerContact<f64> {
         PerContact::of(|contact| tooth.pressure.get(contact).stress_mpa(*force_n.get(contact)))
     }
 
-    /// The teeth of one zone, which stands for all; of all of them where zones are unlike.
+    /// Returns the springs of these teeth: those of one zone, or of all zones if they are not alike.
     fn springs<'s>(&self, teeth: &'s [ToothState]) -> Springs<'s, ToothState> {
         Springs::new(teeth, self.zones)
     }
 
-    /// The `Δφ` that balances the input torque over these teeth of one zone, or of all where zones are unlike.
+    /// Returns the `Δφ` that balances the input torque over these teeth of one zone, or of all if zones are not alike.
     ///
     /// # Errors
-    /// [`SolveError::NoLeverArm`] where none of them can carry, [`SolveError::JohnsonBeyondHalfWidth`] where that law ends before.
+    /// [`SolveError::NoLeverArm`] if none can carry, [`SolveError::JohnsonBeyondHalfWidth`] if that law ends before.
     pub fn wind_up(&self, teeth: &[ToothState]) -> Result<WindUp, SolveError> {
         let wind_up = self.springs(teeth).wind_up(self.input_torque_nmm)?.ok_or_else(|| self.carries_nothing(teeth))?;
         if let Some(end) = self.law_end(teeth, &wind_up.rotation)? {
@@ -742,7 +753,7 @@ impl<'a> LoadedDrive<'a> {
         Ok(WindUp { lost_motion_rad: self.lost_motion_rad(), ..wind_up })
     }
 
-    /// Why teeth carry no torque, or not so much of it.
+    /// Returns the reason why teeth carry no torque, or less than the required torque.
     pub(crate) fn carries_nothing(&self, teeth: &[ToothState]) -> SolveError {
         if self.wave_generator_moves && teeth.iter().any(|tooth| tooth.spring.static_arm_mm > 0.0) {
             SolveError::TurnedPastTeeth
@@ -751,20 +762,23 @@ impl<'a> LoadedDrive<'a> {
         }
     }
 
-    /// Lost motion that all teeth have alike: their closing angles leave it out.
+    /// Returns the lost motion common to all teeth, which their closing angles exclude.
     pub(crate) fn lost_motion_rad(&self) -> f64 {
         self.gaps.lost_motion_rad()
     }
 
-    /// The largest input torque under which no contact of these teeth exceeds its stress, and the contact that reaches it.
+    /// Returns the largest input torque under which no contact of these teeth exceeds its stress, and the contact that
+    /// reaches it.
     ///
-    /// Loads grow with `Δφ` and `Δφ` with the torque, so the first contact to reach its stress sets `Δφ`, and that the torque.
+    /// Loads grow with `Δφ` and `Δφ` with the torque, so the first contact to reach its stress sets `Δφ`, and that the
+    /// torque.
     ///
-    /// Where Johnson's law ends before, the torque of its end. Where the wave generator moves the torque may have been larger on the way, and then that is the
-    /// largest: all loads up to it are carried before any contact has reached its stress, and no larger one is until a contact has.
+    /// If Johnson's law ends before, the result is the torque at its end. If the lever arms change with wind-up, the
+    /// torque may have a maximum before any contact reaches its stress. That maximum is then the result: larger torques
+    /// are not carried until a contact has exceeded its stress.
     ///
     /// # Errors
-    /// As [`Self::wind_up`], but for that end.
+    /// As [`Self::wind_up`], except for the end of Johnson's law.
     pub fn torque_limit(
         &self,
         teeth: &[ToothState],
@@ -788,7 +802,7 @@ impl<'a> LoadedDrive<'a> {
         Ok(TorqueLimit { input_torque_nmm, contact, turns_past_teeth: summit.is_some(), law_end: None })
     }
 
-    /// The contact whose stress at a rotation is the largest share of the one that it may have.
+    /// Returns the contact with the largest ratio of stress to allowable stress at a rotation.
     fn nearest_to_stress(
         &self,
         teeth: &[ToothState],
@@ -809,7 +823,7 @@ impl<'a> LoadedDrive<'a> {
         Ok(nearest.0)
     }
 
-    /// Of all teeth and contacts the one for which the rotation is least at which the tooth bears a certain `F_H`.
+    /// Returns the tooth and contact that reach a given `F_H` at the least rotation.
     fn first_to_reach(teeth: &[ToothState], limit_n: impl Fn(&ToothState, Contact) -> f64) -> Option<FirstLimit<'_>> {
         let first_rad = teeth.iter().map(|tooth| tooth.spring.closing_rad).fold(f64::INFINITY, f64::min);
         let mut least: Option<(f64, FirstLimit<'_>)> = None;
@@ -831,7 +845,7 @@ impl<'a> LoadedDrive<'a> {
         least.map(|(_, limit)| limit)
     }
 
-    /// Where Johnson's law ends, if at this rotation some contact is wider than it allows.
+    /// Returns the end of Johnson's law if some contact is wider at this rotation than the law allows.
     fn law_end(&self, teeth: &[ToothState], rotation: &Rotation) -> Result<Option<LawEnd>, SolveError> {
         let ContactLaw::Johnson { depth_mm } = &self.law else { return Ok(None) };
         let is_beyond = |tooth: &ToothState| tooth.spring.displacement_mm(rotation) >= tooth.spring.approach.limit_mm();
@@ -842,9 +856,9 @@ impl<'a> LoadedDrive<'a> {
         let tooth_width_mm = self.drive.tooth_width_mm();
         let limit_mm = |contact| WIDEST_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
         let limit = Self::first_to_reach(teeth, |tooth, contact| {
-            // Under `F_r` the half-width is the whole length, and its square goes as the force.
+            // The half-width's square is proportional to the force.
             let pressure = tooth.pressure.get(contact);
-            // The law is of contacts along a line.
+            // The law applies to line contacts only.
             if matches!(pressure, Pressure::Corner(_) | Pressure::Flat(_)) {
                 return f64::INFINITY;
             }
@@ -862,7 +876,7 @@ impl<'a> LoadedDrive<'a> {
     }
 }
 
-/// The first of many contacts to reach what it may bear.
+/// The first of many contacts to reach its limit.
 struct FirstLimit<'a> {
     tooth: &'a ToothState,
     contact: Contact,

@@ -1,4 +1,4 @@
-//! What a turn costs: slip, friction's power, efficiency (docs/theory.md section 10); wear, the bearing's load and life, and duty in
+//! What a turn costs: slip, friction's power, efficiency (docs/explanation/theory.md section 10); wear, the bearing's load and life, and duty in
 //! the modules below.
 //!
 //! Friction is taken to first order in its coefficients: normal forces are those without friction, and what is lost is what they lose
@@ -431,7 +431,7 @@ impl Friction {
 
     /// How far an efficiency at the loss ℓ may be from that of an exact equilibrium with Coulomb friction: `(C μ + 10 μ_p) ℓ`, μ the
     /// largest coefficient, `μ_p` what friction there can be along the wave generator as a whole: on a race no more than its bearing
-    /// has. C and the ranges were measured (docs/theory.md section 10.6, `tests/reference/friction.py ranges`).
+    /// has. C and the ranges were measured (docs/explanation/theory.md section 10.6, `tests/reference/friction.py ranges`).
     pub fn first_order_error(&self, mechanism: &Mechanism, loss_share: f64) -> FirstOrderError {
         let of_bearing =
             self.bearing().map_or(0.0, |bearing| bearing.coefficient * bearing.radius_mm / mechanism.race_radius_mm);

@@ -1,4 +1,4 @@
-//! How far the model is off elastic bodies: what was measured against finite elements (docs/validation.md), and whether a drive is one of
+//! How far the model is off elastic bodies: what was measured against finite elements (docs/explanation/validation.md), and whether a drive is one of
 //! those that this speaks for.
 
 use crate::backing::{Backing, Fingers, Rim, Shares, Support};

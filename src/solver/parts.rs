@@ -1,4 +1,4 @@
-//! The parts as they are made: what the mechanics leave free, and clearances (docs/theory.md section 8).
+//! The parts as they are made: what the mechanics leave free, and clearances (docs/explanation/theory.md section 8).
 //!
 //! A part's clearance sets its working surface back into the part, along the surface's normal: the ring's flank outward, the cam
 //! inward, the slot's walls apart, the tooth's radius down. The gap at a contact is the sum of its two parts' clearances.

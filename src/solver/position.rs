@@ -1,10 +1,10 @@
-//! A tooth's position ψ from the lobe it is on, kept exact at both ends of half a lobe (docs/theory.md section 3).
+//! Position ψ of a tooth on its lobe, exact at both ends of half a lobe (docs/explanation/theory.md section 3).
 
 use std::f64::consts::PI;
 
-/// A position ψ in `[0, π/U]`, from the middle of a lobe to the valley beside it. Its distance to either, and its phase, which runs
-/// through a quarter turn for any number of lobes, have full relative precision: near the lobe ψ itself is small, near the valley
-/// `π/U - ψ` is.
+/// Position ψ in `[0, π/U]`, from the middle of a lobe to the adjacent valley. Its distance to either end and its phase
+/// have full relative precision: ψ is small near the lobe, `π/U - ψ` near the valley. The phase covers a quarter turn
+/// for any number of lobes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
     /// ψ, from the middle of the lobe.
@@ -19,35 +19,35 @@ pub struct Position {
     pub lobes: u32,
 }
 
-/// Half the angle of a lobe, `π/U`.
+/// Returns half the angle of a lobe, `π/U`.
 pub fn half_lobe_rad(lobes: u32) -> f64 {
     PI / f64::from(lobes)
 }
 
 impl Position {
-    /// In the middle of the lobe: the root of the ring's tooth space.
+    /// Returns the position in the middle of the lobe: the root of the ring's tooth space.
     pub fn lobe(lobes: u32) -> Self {
         Self { from_lobe_rad: 0.0, from_valley_rad: half_lobe_rad(lobes), phase_cos: 1.0, phase_sin: 0.0, lobes }
     }
 
-    /// In the valley: the tip of the ring's tooth.
+    /// Returns the position in the valley: the tip of the ring's tooth.
     pub fn valley(lobes: u32) -> Self {
         Self { from_lobe_rad: half_lobe_rad(lobes), from_valley_rad: 0.0, phase_cos: 0.0, phase_sin: 1.0, lobes }
     }
 
-    /// At `ψ` in `[0, π/U]`; exact towards the lobe.
+    /// Returns the position `ψ` in `[0, π/U]`; exact towards the lobe.
     pub fn from_lobe(from_lobe_rad: f64, lobes: u32) -> Self {
         let (phase_sin, phase_cos) = (0.5 * f64::from(lobes) * from_lobe_rad).sin_cos();
         Self { from_lobe_rad, from_valley_rad: half_lobe_rad(lobes) - from_lobe_rad, phase_cos, phase_sin, lobes }
     }
 
-    /// At `x = π/U - ψ` in `[0, π/U]`; exact towards the valley.
+    /// Returns the position `x = π/U - ψ` in `[0, π/U]`; exact towards the valley.
     pub fn from_valley(from_valley_rad: f64, lobes: u32) -> Self {
         let (phase_cos, phase_sin) = (0.5 * f64::from(lobes) * from_valley_rad).sin_cos();
         Self { from_lobe_rad: half_lobe_rad(lobes) - from_valley_rad, from_valley_rad, phase_cos, phase_sin, lobes }
     }
 
-    /// At two distances that add up to `π/U`, each exact.
+    /// Returns the position at two distances that add up to `π/U`, each exact.
     pub(crate) fn between(from_lobe_rad: f64, from_valley_rad: f64, lobes: u32) -> Self {
         let phase = |rad: f64| (0.5 * f64::from(lobes) * rad).sin_cos();
         let (phase_sin, phase_cos) = if from_lobe_rad < from_valley_rad {
@@ -59,14 +59,16 @@ impl Position {
         Self { from_lobe_rad, from_valley_rad, phase_cos, phase_sin, lobes }
     }
 
-    /// At the whole fraction `numerator / denominator` of a turn from the lobe; exact towards both ends. None beyond the valley.
+    /// Returns the position at the fraction `numerator / denominator` of a turn from the lobe, exact towards both ends;
+    /// none beyond the valley.
     pub fn of_turn(numerator: u64, denominator: u64, lobes: u32) -> Option<Self> {
         let of_lobe = numerator.checked_mul(u64::from(lobes))?;
         let is_to_valley = denominator > 0 && 2 * u128::from(of_lobe) <= u128::from(denominator);
         is_to_valley.then(|| Self::of_lobe(of_lobe, denominator, lobes))
     }
 
-    /// At the whole fraction `numerator / denominator` of a lobe, at most half of it; exact towards both ends.
+    /// Returns the position at the fraction `numerator / denominator` of a lobe, at most half of it; exact towards both
+    /// ends.
     pub(crate) fn of_lobe(numerator: u64, denominator: u64, lobes: u32) -> Self {
         debug_assert!(2 * u128::from(numerator) <= u128::from(denominator));
         // Below 2^53 for every sweep (lobes × samples × installed teeth), so that the conversions are exact.
@@ -76,12 +78,12 @@ impl Position {
         Self::between(from_lobe_rad, from_valley_rad, lobes)
     }
 
-    /// `π/U`.
+    /// Returns `π/U`.
     pub fn half_lobe_rad(&self) -> f64 {
         half_lobe_rad(self.lobes)
     }
 
-    /// ψ in degrees.
+    /// Returns ψ in degrees.
     pub fn from_lobe_deg(&self) -> f64 {
         if self.from_valley_rad < self.from_lobe_rad {
             180.0 / f64::from(self.lobes) - self.from_valley_rad.to_degrees()

@@ -1,4 +1,4 @@
-//! The mating parts' profiles, sampled to a chord tolerance.
+//! Profiles of the mating parts, sampled to a chord tolerance.
 
 use std::f64::consts::PI;
 
@@ -15,7 +15,7 @@ use crate::{SolveError, Stop};
 /// A polyline in mm.
 pub type Polyline = Vec<Point2<f64>>;
 
-/// How much of the ring is wanted.
+/// Extent of the ring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
     /// From one tooth's symmetry line to the next, angles ∓π/Z_K.
@@ -24,18 +24,18 @@ pub enum Extent {
     Full,
 }
 
-/// What profiles are asked for.
+/// Parameters of the profiles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProfileParameters {
-    /// How far a chord may be from its curve.
+    /// Largest distance of a chord from its curve, in mm.
     pub chord_tolerance_mm: f64,
-    /// How much of the ring.
+    /// Extent of the ring.
     pub extent: Extent,
-    /// How many points at most, over all profiles.
+    /// Largest number of points over all profiles.
     pub max_points: u64,
 }
 
-/// The profiles of the mating parts.
+/// Profiles of the mating parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profiles {
     /// The ring, in its own frame.
@@ -46,28 +46,28 @@ pub struct Profiles {
     pub wave_generator: Polyline,
 }
 
-/// A point of a curve with its tangent and the way it bends.
+/// Point of a curve with its tangent and sign of curvature.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CurvePoint {
     pub(crate) point: Point2<f64>,
     pub(crate) tangent: Unit<Vector2<f64>>,
-    /// Of unlike signs on either side of an inflection.
+    /// Curvature up to a positive factor: its sign changes at an inflection.
     pub(crate) bend: f64,
 }
 
-/// How densely a curve is sampled.
+/// Sampling density of a curve.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Density {
-    /// How true its chords are.
+    /// Chord tolerance, in mm.
     pub(crate) tolerance_mm: f64,
-    /// Points for each of these chords, so that a denser sample has so many times the points and never more.
+    /// Points for each chord: a denser sample has exactly this many times the points.
     pub(crate) points_per_chord: u32,
-    /// How many chords are given up at: what a whole outline may have, its curves may have each.
+    /// Limit of chords for a whole outline, applied to each of its curves.
     pub(crate) max_chords: u64,
 }
 
 impl Density {
-    /// The ends of the chords alone.
+    /// Returns the density of the chords' ends only.
     const fn of_chords(parameters: &ProfileParameters) -> Self {
         Self { tolerance_mm: parameters.chord_tolerance_mm, points_per_chord: 1, max_chords: parameters.max_points }
     }
@@ -79,13 +79,13 @@ pub(crate) struct SampledCurve {
     pub(crate) tangents: Vec<Unit<Vector2<f64>>>,
 }
 
-/// Pieces that half a lobe starts with, so short that no tangent stands across its chord.
+/// Initial number of pieces of half a lobe: so short that no tangent is perpendicular to its chord.
 const PIECES: u32 = 16;
 
-/// Halvings of a piece at most: 2^40 chords of a piece are beyond every tolerance that the ranges allow.
+/// Largest number of bisections of a piece: 2^40 chords are beyond every tolerance in the range.
 const MAX_DEPTH: u32 = 40;
 
-/// The profiles of a drive.
+/// Returns the profiles of a drive.
 ///
 /// # Errors
 /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
@@ -112,16 +112,16 @@ pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) 
     })
 }
 
-/// About how many points the profiles have, [`ProfileParameters::max_points`] at most: no fewer than they do have, and some times as many.
+/// Estimates the number of points of the profiles, at most [`ProfileParameters::max_points`]. It is an upper bound.
 pub fn expected_points(drive: &Drive, parameters: &ProfileParameters) -> u64 {
     let tolerance_mm = parameters.chord_tolerance_mm;
-    // Of a curve that turns by κ ds the height of a chord's tangents is c²κ/4, and halving leaves chords down to half as long as they may
-    // be: some ∫ √(κ/t) ds of them, by Cauchy and Schwarz no more than √(∫κ ds · L / t).
+    // For a curve that rotates by κ ds, the height of a chord's tangents is c²κ/4, and bisection leaves chords at least
+    // half as long as allowed. Their number is about ∫ √(κ/t) ds, by Cauchy and Schwarz at most √(∫κ ds · L / t).
     let chords = |turned_rad: f64, length_mm: f64| f64::from(PIECES) + (turned_rad * length_mm / tolerance_mm).sqrt();
     let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
     let lobes = f64::from(drive.lobes());
     let (root_mm, height_mm) = (drive.root_radius_mm(), drive.root_radius_mm() - drive.tip_radius_mm());
-    // A half rises and falls in no more than its arc and its height; its slope comes from nothing and goes there again.
+    // Half a profile rises and falls by at most its arc and its height; its slope starts and ends at zero.
     let half = |parts: f64| chords(PI + PI / parts, PI * root_mm / parts + height_mm);
     let copies = match parameters.extent {
         Extent::Tooth => 1.0,
@@ -137,7 +137,7 @@ pub fn expected_points(drive: &Drive, parameters: &ProfileParameters) -> u64 {
     points.min(parameters.max_points)
 }
 
-/// The ring from the middle of its tooth space to its tooth's symmetry line, land of a bored tip included.
+/// Returns the ring from the middle of its tooth space to its tooth's symmetry line, including the land of a bored tip.
 fn ring_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let mut points = flank_curve(drive.flank(), drive.flank_limit(), density, stop)?.points;
     let tip_rad = PI / drive.parameters().ring_teeth as f64;
@@ -163,7 +163,7 @@ fn ring_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<P
     Ok(points)
 }
 
-/// The ring's flank from the middle of its tooth space to its end.
+/// Returns the ring's flank from the middle of its tooth space to its end.
 pub(crate) fn flank_curve(
     flank: &RingFlank,
     limit: &FlankLimit,
@@ -182,7 +182,7 @@ pub(crate) fn flank_curve(
     })
 }
 
-/// The path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
+/// Returns the path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
 fn path_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let flank = drive.flank();
     let lobes = drive.lobes();
@@ -204,7 +204,8 @@ fn path_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<P
     Ok(points)
 }
 
-/// The wave generator from the middle of a lobe to the valley beside it, set back along its normal by less than its least radius of curvature.
+/// Returns the wave generator from the middle of a lobe to the adjacent valley, offset inward by less than its least
+/// radius of curvature.
 pub(crate) fn cam_half_lobe(
     locus: &Locus,
     clearance_mm: f64,
@@ -216,14 +217,14 @@ pub(crate) fn cam_half_lobe(
         let CamPoint { point, tangent, bend } = locus.cam_outline(clearance_mm, place)?;
         Ok(CurvePoint { point, tangent, bend })
     })?;
-    // The last point stands on the valley's line.
+    // The last point is on the valley's line.
     if let Some(last) = curve.points.last_mut() {
         *last = Point2::from(last.coords.norm() * direction(1, 2 * lobes));
     }
     Ok(curve)
 }
 
-/// The closed wave generator from half a lobe of it: mirrored at the valley, then turned from lobe to lobe.
+/// Returns the closed wave generator from half a lobe: mirrored at the valley, then rotated from lobe to lobe.
 pub(crate) fn cam_outline(half_lobe: &Polyline, lobes: u32) -> Polyline {
     let pitch = direction(1, lobes);
     // Adding zero turns -0.0 into 0.0.
@@ -246,7 +247,7 @@ pub(crate) fn cam_outline(half_lobe: &Polyline, lobes: u32) -> Polyline {
     outline
 }
 
-/// The direction at a fraction of a turn, exact on the axes.
+/// Returns the direction at a fraction of a turn, exact on the axes.
 pub(crate) fn direction(numerator: u32, denominator: u32) -> Vector2<f64> {
     let quarters = 4 * u64::from(numerator);
     let whole = u64::from(denominator);
@@ -267,7 +268,8 @@ fn on_circle(radius_mm: f64, angle_rad: f64) -> Point2<f64> {
     Point2::new(radius_mm * cos, radius_mm * sin)
 }
 
-/// The curve over positions from `start` to `end`, both included, by halving pieces until each chord is true.
+/// Samples the curve over positions from `start` to `end`, both included, by bisection until each chord is in
+/// tolerance.
 pub(crate) fn sampled(
     start: Position,
     end: Position,
@@ -276,7 +278,7 @@ pub(crate) fn sampled(
     stop: &dyn Stop,
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
 ) -> Result<SampledCurve, SolveError> {
-    // Measured from the valley, where cusps are; beyond the middle a `Position` is as good from the other side.
+    // Measured from the valley, where cusps are. Beyond the middle a `Position` is as precise from the other side.
     let half_rad = half_lobe_rad(lobes);
     let at = |x: f64| {
         if x <= end.from_valley_rad {
@@ -327,16 +329,17 @@ pub(crate) fn sampled(
     Ok(SampledCurve { points, tangents })
 }
 
-/// How often an arc is seen to change the way it bends.
+/// Counts the visible changes of the sign of curvature of an arc.
 fn inflections_seen(arc: &[CurvePoint]) -> usize {
     arc.windows(2).filter(|pair| pair[0].bend * pair[1].bend < 0.0).count()
 }
 
-/// An upper bound of the distance between an arc with one inflection at most and its chord (docs/theory.md section 2.8).
+/// Returns an upper bound of the distance between an arc with at most one inflection and its chord
+/// (docs/explanation/theory.md section 2.8).
 ///
-/// A convex arc lies in the triangle of its chord and its end tangents, whose height is
-/// `c sin α sin β / sin(α + β)`; an arc with one inflection stays below the tangent at one end and above that at the other, within
-/// `c max(tan α, tan β)`, on whichever sides of the chord these are.
+/// A convex arc is within the triangle of its chord and its end tangents, whose height is `c sin α sin β / sin(α + β)`.
+/// An arc with one inflection is below the tangent at one end and above that at the other, within
+/// `c max(tan α, tan β)`, on either side of the chord.
 fn chord_deviation_mm(from: &CurvePoint, to: &CurvePoint) -> f64 {
     let chord = to.point - from.point;
     let length = chord.norm();
@@ -358,9 +361,9 @@ fn chord_deviation_mm(from: &CurvePoint, to: &CurvePoint) -> f64 {
     }
 }
 
-/// From a half that starts in the middle of the tooth space: from tip to tip, counter-clockwise.
+/// Returns the profile from tip to tip, counter-clockwise, from a half that starts in the middle of the tooth space.
 fn from_tip_to_tip(half: &Polyline) -> Polyline {
-    // Subtracting from zero, because -0.0 is no better a 0.0.
+    // Subtracting from zero avoids -0.0.
     let image = half.iter().rev().map(|p| Point2::new(p.x, 0.0 - p.y));
     image.chain(half.iter().skip(1).copied()).collect()
 }
@@ -379,7 +382,7 @@ fn repeated(tooth: &Polyline, ring_teeth: u64, extent: Extent) -> Polyline {
     }
 }
 
-/// The same curve with its first point as its last.
+/// Returns the same curve with its first point repeated at the end.
 fn closed(curve: &Polyline) -> Polyline {
     let mut points = curve.clone();
     if let (Some(&first), Some(last)) = (points.first(), points.last())

@@ -1,5 +1,5 @@
-//! The ring's flank: the outer parallel curve of the centres' path at the tooth radius (docs/theory.md section 2), or, in a ring
-//! made with clearance, a little farther out.
+//! Flank of the ring: the outer parallel curve of the centres' path at the tooth radius (docs/explanation/theory.md
+//! section 2). In a ring made with clearance it is slightly farther out.
 
 use std::f64::consts::PI;
 
@@ -18,7 +18,7 @@ pub struct RingFlank {
     distance_mm: f64,
 }
 
-/// Where a tooth touches the ring: its flank, or the corner that ends it.
+/// Contact of a tooth with the ring: on its flank, or on the corner that ends it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlankPoint {
     /// Distance of the tooth's centre from it: that of the flank from the path of the centres, or more before a corner.
@@ -27,11 +27,11 @@ pub struct FlankPoint {
     pub tan_pressure_angle: f64,
     /// cos β.
     pub cos_pressure_angle: f64,
-    /// `1 + rκ`, κ the curvature of the centres' path: positive on the flank, small where it comes near a cusp.
+    /// `1 + rκ`, κ the curvature of the centres' path: positive on the flank, small near a cusp.
     pub regularity: f64,
 }
 
-/// What ends the flank towards the tip.
+/// Cause of the flank's end towards the tip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlankEnd {
     /// The valley: a regular tip.
@@ -42,30 +42,30 @@ pub enum FlankEnd {
     Bore,
 }
 
-/// Where and why the flank ends.
+/// End of the flank towards the tip, and its cause.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlankLimit {
-    /// ψ_e: beyond it a tooth touches no ring.
+    /// ψ_e: position beyond which a tooth does not touch the ring.
     pub position: Position,
-    /// What ends it.
+    /// Cause of the end.
     pub end: FlankEnd,
 }
 
-/// One tooth of the ring: its flank and what ends it.
+/// One tooth of the ring: its flank and the flank's end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RingTooth {
     /// The flank.
     pub flank: RingFlank,
-    /// Where and why it ends.
+    /// End of the flank, and its cause.
     pub limit: FlankLimit,
-    /// Radius of the tip before any bore.
+    /// Radius of the tip before any bore, in mm.
     pub natural_tip_radius_mm: f64,
-    /// Radius of the tip: natural, trimmed by undercut, or bored.
+    /// Radius of the tip: natural, trimmed by undercut, or bored, in mm.
     pub tip_radius_mm: f64,
 }
 
 impl RingTooth {
-    /// The tooth of this flank, truncated by a bore where it has one, which lies inside the root.
+    /// Builds the tooth of this flank, truncated by a bore (if any) inside the root.
     pub(crate) fn new(flank: RingFlank, bore_mm: Option<f64>) -> Result<Self, NotConverged> {
         let natural = flank.natural_limit()?;
         let natural_tip_radius_mm = match natural.end {
@@ -80,7 +80,7 @@ impl RingTooth {
             return Ok(unbored);
         };
         let position = flank.position_at_radius(tip_radius_mm)?;
-        // Beside an undercut tip rounding could otherwise move the end outward.
+        // Next to an undercut tip, rounding could otherwise move the end outward.
         let limit = if position.from_valley_rad > natural.position.from_valley_rad {
             FlankLimit { position, end: FlankEnd::Bore }
         } else {
@@ -89,8 +89,8 @@ impl RingTooth {
         Ok(Self { limit, tip_radius_mm, ..unbored })
     }
 
-    /// The engaged tooth with the largest pressure angles: at the steepest place of the path, or where the flank ends
-    /// before it.
+    /// Returns the engaged tooth with the largest pressure angles. It is at the steepest point of the path, or at the
+    /// end of the flank if that comes first.
     pub(crate) fn steepest_engaged(&self) -> Result<ToothCenter, NotConverged> {
         let locus = self.flank.locus();
         let steepest = locus.steepest()?;
@@ -102,7 +102,8 @@ impl RingTooth {
     }
 }
 
-/// The corner in which a pointed or bored flank ends, as teeth see it that have not come to the flank yet (docs/theory.md section 4.4, `corner_contact`).
+/// Corner at the end of a pointed or bored flank, as seen from teeth before the flank (docs/explanation/theory.md
+/// section 4.4, `corner_contact`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipCorner {
     flank: RingFlank,
@@ -110,16 +111,16 @@ pub struct TipCorner {
     /// The flank at the corner.
     flank_end: FlankPoint,
     radius_mm: f64,
-    /// Angle of the corner from the symmetry line of the ring's tooth, about the axis: nothing of a pointed tip.
+    /// Angle of the corner from the symmetry line of the ring's tooth, about the axis; 0 for a pointed tip.
     from_tip_rad: f64,
 }
 
-/// A tooth nearer to the flank's end than this is on the flank: nearer than what is turned in any answer, and farther than what two ways to the same
-/// place differ by, so that all of them tell alike.
+/// A tooth within this angle of the flank's end counts as on the flank. It is below every rotation in an answer and
+/// above the difference of two methods, so that all decide alike.
 const AT_END_RAD: f64 = 1e-12;
 
 impl TipCorner {
-    /// That of a ring's tooth; none at a regular tip.
+    /// Returns the corner of a ring's tooth; none at a regular tip.
     pub(crate) fn of(tooth: &RingTooth) -> Result<Option<Self>, NotConverged> {
         let &RingTooth { flank, limit, .. } = tooth;
         if limit.end == FlankEnd::RegularTip {
@@ -133,25 +134,25 @@ impl TipCorner {
         Ok(Some(Self { flank, limit, flank_end, radius_mm, from_tip_rad }))
     }
 
-    /// Whether a tooth stands before the flank, where it meets the corner first.
+    /// Returns true if a tooth is before the flank, where it meets the corner first.
     pub(crate) fn is_before_flank(&self, position: &Position) -> bool {
         position.from_valley_rad < self.limit.position.from_valley_rad - AT_END_RAD
     }
 
-    /// The place nearest to the flank that is still before it.
+    /// Returns the position nearest to the flank that is still before it.
     pub(crate) fn last_before_flank(limit: &FlankLimit) -> Position {
         let Position { from_valley_rad, lobes, .. } = limit.position;
         Position::from_valley((from_valley_rad - 2.0 * AT_END_RAD).max(0.0), lobes)
     }
 
-    /// The corner as seen from a tooth before the flank: along the line from its centre.
+    /// Returns the corner as seen from a tooth before the flank, along the line from its centre.
     pub(crate) fn seen_from(&self, tooth: &ToothCenter) -> FlankPoint {
         let k = self.flank.teeth_per_wave;
         let (sin, cos) = (tooth.position.from_valley_rad / k - self.from_tip_rad).sin_cos();
         let (along_mm, across_mm) = (self.radius_mm * cos - tooth.center_radius_mm, self.radius_mm * sin);
         let distance_mm = along_mm.hypot(across_mm);
         FlankPoint {
-            // No tooth's circle reaches over the corner: what is missing is rounding.
+            // No tooth's circle extends beyond the corner: a smaller distance is rounding.
             distance_mm: distance_mm.max(self.flank.distance_mm),
             tan_pressure_angle: across_mm / along_mm,
             cos_pressure_angle: along_mm / distance_mm,
@@ -159,8 +160,9 @@ impl TipCorner {
         }
     }
 
-    /// What a force on the flank moves the corner by more than it would move a wall, for each unit of the logarithm by which it is nearer to it and over
-    /// `(1 - ν²)/(π E L1)`: by the solution for a wedge that is pressed at its apex (docs/theory.md section 4.4, `corner_contact`).
+    /// Returns the extra displacement of the corner under a force on the flank, relative to a plane wall. It is for
+    /// each unit of the logarithm of the distance, over `(1 - ν²)/(π E L1)`. It follows from the solution for a wedge
+    /// loaded at its apex (docs/explanation/theory.md section 4.4, `corner_contact`).
     pub(crate) fn bending_growth(&self) -> f64 {
         let normal_rad = self.flank_end.tan_pressure_angle.atan();
         // Half of the angle between the flank and its mirror image, or the land.
@@ -174,12 +176,12 @@ impl TipCorner {
         PI * (sin * sin / (half_rad + sin * cos) + cos * cos / (half_rad - sin * cos)) - 2.0
     }
 
-    /// What a tooth's circle keeps from the corner.
+    /// Returns the gap between a tooth's circle and the corner.
     pub(crate) fn gap_mm(&self, seen: &FlankPoint) -> f64 {
         seen.distance_mm - self.flank.distance_mm
     }
 
-    /// By how much the line from a tooth's centre to the corner is turned against the flank's normal there.
+    /// Returns the angle between the line from a tooth's centre to the corner and the flank's normal there.
     pub(crate) fn angle_off_flank_rad(&self, tooth: &ToothCenter, seen: &FlankPoint) -> f64 {
         let before_rad = self.limit.position.from_valley_rad - tooth.position.from_valley_rad;
         let turned_rad = before_rad / self.flank.teeth_per_wave;
@@ -192,42 +194,42 @@ impl RingFlank {
         Self { locus, teeth_per_wave, distance_mm: locus.tooth_radius_mm() }
     }
 
-    /// The same flank cut back along its normal.
+    /// Returns the same flank offset outward along its normal.
     pub(crate) fn set_back_by(self, clearance_mm: f64) -> Self {
         Self { distance_mm: self.distance_mm + clearance_mm, ..self }
     }
 
-    /// Radius of the ring at the middle of its tooth space, `d_l + r` without clearance.
+    /// Returns the radius of the ring at the middle of its tooth space, `d_l + r` without clearance.
     pub fn root_radius_mm(&self) -> f64 {
         self.locus.cam_outer_radius_mm() + self.height_over_cam_mm()
     }
 
-    /// Radius of a regular tip, `d_v + r` without clearance.
+    /// Returns the radius of a regular tip, `d_v + r` without clearance.
     fn regular_tip_radius_mm(&self) -> f64 {
         self.locus.cam_inner_radius_mm() + self.height_over_cam_mm()
     }
 
-    /// Distance of the flank from the path of the teeth's centres, `r` without clearance.
+    /// Returns the distance of the flank from the path of the tooth centres, `r` without clearance.
     pub(crate) const fn distance_mm(&self) -> f64 {
         self.distance_mm
     }
 
-    /// Distance of cam and flank along a common normal, `2r` without clearance.
+    /// Returns the distance of cam and flank along a common normal, `2r` without clearance.
     fn height_over_cam_mm(&self) -> f64 {
         self.locus.tooth_radius_mm() + self.distance_mm
     }
 
-    /// The path that the flank is parallel to.
+    /// Returns the path to which the flank is parallel.
     pub const fn locus(&self) -> &Locus {
         &self.locus
     }
 
-    /// `k = Z_K / U`.
+    /// Returns `k = Z_K / U`.
     pub const fn teeth_per_wave(&self) -> f64 {
         self.teeth_per_wave
     }
 
-    /// The flank where `tooth` touches it.
+    /// Returns the point of the flank that `tooth` touches.
     pub fn at(&self, tooth: &ToothCenter) -> FlankPoint {
         let k = self.teeth_per_wave;
         let tan_pressure_angle = k * tooth.tan_pressure_angle;
@@ -235,13 +237,14 @@ impl RingFlank {
         let cos_pressure_angle = 1.0 / secant_squared.sqrt();
         let turning = self.turning(tooth);
         let regularity = 1.0 + self.distance_mm * (cos_pressure_angle / tooth.center_radius_mm) * turning;
-        // Positive wherever a tooth meshes; nearer to zero than its own rounding it is not known, and a curvature of
-        // 1/0 or below would be neither.
+        // Positive wherever a tooth meshes. Values below its own rounding error are unknown, and would give a curvature
+        // of 1/0 or a negative one.
         let regularity = regularity.max(f64::EPSILON);
         FlankPoint { distance_mm: self.distance_mm, tan_pressure_angle, cos_pressure_angle, regularity }
     }
 
-    /// By how much the normal of flank and path turns for each radian that the path goes around the axis: of the sign of κ.
+    /// Returns the rotation of the normal of flank and path for each radian of the path about the axis: of the sign of
+    /// κ.
     pub(crate) fn turning(&self, tooth: &ToothCenter) -> f64 {
         let k = self.teeth_per_wave;
         let tan_pressure_angle = k * tooth.tan_pressure_angle;
@@ -249,69 +252,71 @@ impl RingFlank {
         1.0 + k * k * tooth.tan_pressure_angle_derivative / secant_squared
     }
 
-    /// Angle of the contact point from the tooth's centre line, seen from the axis: `atan(r sin β / (d + r cos β))`.
+    /// Returns the angle of the contact point from the tooth's centre line, about the axis:
+    /// `atan(r sin β / (d + r cos β))`.
     pub fn lead_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
         let normal_mm = point.distance_mm * point.cos_pressure_angle;
         (normal_mm * point.tan_pressure_angle / (tooth.center_radius_mm + normal_mm)).atan()
     }
 
-    /// Angle of the contact point from the middle of the tooth space.
+    /// Returns the angle of the contact point from the middle of the tooth space.
     pub fn angle_from_space_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
         tooth.position.from_lobe_rad / self.teeth_per_wave + self.lead_rad(tooth, point)
     }
 
-    /// Angle φ_K of the contact point from the symmetry line of the ring's tooth.
+    /// Returns the angle φ_K of the contact point from the symmetry line of the ring's tooth.
     pub fn angle_from_tip_rad(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
         tooth.position.from_valley_rad / self.teeth_per_wave - self.lead_rad(tooth, point)
     }
 
-    /// Distance `R` of the contact point from the axis.
+    /// Returns the distance `R` of the contact point from the axis.
     pub fn radius_mm(&self, tooth: &ToothCenter, point: &FlankPoint) -> f64 {
         let normal_mm = point.distance_mm * point.cos_pressure_angle;
         (tooth.center_radius_mm + normal_mm).hypot(normal_mm * point.tan_pressure_angle)
     }
 
-    /// The contact point in the ring's frame.
+    /// Returns the contact point in the ring's frame.
     pub fn point(&self, tooth: &ToothCenter, point: &FlankPoint) -> Point2<f64> {
         let (sin, cos) = self.angle_from_space_rad(tooth, point).sin_cos();
         Point2::from(Vector2::new(cos, sin) * self.radius_mm(tooth, point))
     }
 
-    /// The tangent of flank and path alike, towards the tip, in the ring's frame.
+    /// Returns the common tangent of flank and path, towards the tip, in the ring's frame.
     pub fn tangent(&self, tooth: &ToothCenter, point: &FlankPoint) -> Unit<Vector2<f64>> {
         let normal_rad = tooth.position.from_lobe_rad / self.teeth_per_wave + point.tan_pressure_angle.atan();
         Unit::new_unchecked(Vector2::new(-normal_rad.sin(), normal_rad.cos()))
     }
 
-    /// `d_v (1 + rκ)` at the tip, r being the flank's distance.
+    /// Returns `d_v (1 + rκ)` at the tip, with r the flank's distance.
     fn tip_regularity_mm(&self) -> f64 {
         let bend = self.locus.cam().kind().tip_bend(self.locus.tooth_radius_mm(), self.teeth_per_wave);
         self.regular_tip_radius_mm() - self.distance_mm * bend
     }
 
-    /// Whether the ring's tips are cut away by their own envelope: whether the parallel curve is irregular at the tip.
+    /// Returns true if the ring's tips are undercut by their own envelope: the parallel curve is irregular at the tip.
     pub fn is_undercut(&self) -> bool {
         self.tip_regularity_mm() < 0.0
     }
 
-    /// The least tooth radius that undercuts; none where no radius does.
+    /// Returns the least tooth radius that undercuts; none if no radius does.
     pub fn critical_tooth_radius_mm(&self) -> Option<f64> {
         self.locus.cam().kind().critical_tooth_radius_mm(self.teeth_per_wave)
     }
 
-    /// The least distance from the path of the centres at which this flank is undercut, of an ellipse `(b + r)/(k² (a² - b²)/(a² + br) - 1)`:
-    /// that of the critical tooth radius where distance and radius are one. None where no distance undercuts.
+    /// Returns the least distance from the path of the centres at which this flank is undercut. For an ellipse it is
+    /// `(b + r)/(k² (a² - b²)/(a² + br) - 1)`, and equals the critical tooth radius if distance and radius are equal.
+    /// Returns none if no distance undercuts.
     pub(crate) fn critical_distance_mm(&self) -> Option<f64> {
         let r = self.locus.tooth_radius_mm();
         let bend = self.locus.cam().kind().tip_bend(r, self.teeth_per_wave);
         (bend > 1.0).then(|| (self.locus.cam_inner_radius_mm() + r) / (bend - 1.0))
     }
 
-    /// Where the flank ends if nothing is bored away.
+    /// Returns the end of the flank without a bore.
     ///
-    /// The flank crosses the symmetry line of the ring's tooth where `tan(x/k)(d + r cos β) = r sin β`, `x = π/U - ψ`.
-    /// Divided by `cos β sin(Ux/2) / k` the trivial root `x = 0` is gone, and at the threshold of undercut the
-    /// other one leaves from there like a square root.
+    /// The flank crosses the symmetry line of the ring's tooth at `tan(x/k)(d + r cos β) = r sin β`, `x = π/U - ψ`.
+    /// Division by `cos β sin(Ux/2) / k` removes the trivial root `x = 0`. Above the threshold of undercut the other
+    /// root grows from 0 like a square root.
     ///
     /// # Errors
     /// [`NotConverged`] if the crossing is not found.
@@ -334,14 +339,15 @@ impl RingFlank {
         Ok(FlankLimit { position, end: FlankEnd::Undercut })
     }
 
-    /// Where the flank reaches the radius `bore_mm`, which lies between those of a regular tip and of the root.
+    /// Returns the position at which the flank has the radius `bore_mm`, between those of a regular tip and of the
+    /// root.
     ///
     /// # Errors
     /// [`NotConverged`] if the crossing is not found.
     pub fn position_at_radius(&self, bore_mm: f64) -> Result<Position, NotConverged> {
         let (a, b) = (self.locus.cam_outer_radius_mm(), self.locus.cam_inner_radius_mm());
         let height_mm = self.height_over_cam_mm();
-        // Differences first: a bore may be as near to tip or root as its digits can say.
+        // Differences first: a bore may be as near to tip or root as its digits can express.
         let above_tip_mm = bore_mm - b - height_mm;
         let below_root_mm = a - bore_mm + height_mm;
         let above_tip_mm2 = above_tip_mm * (bore_mm + b + height_mm);
@@ -357,8 +363,8 @@ impl RingFlank {
         self.crossing("flank at the bore", -above_tip_mm2, excess)
     }
 
-    /// The position between tip and root where `function`, of negative value `at_tip` at the tip, changes its sign;
-    /// solved in the angle from whichever of valley and lobe is nearer.
+    /// Returns the position between tip and root at which `function`, negative (`at_tip`) at the tip, changes its sign.
+    /// The unknown is the angle from the nearer of valley and lobe.
     fn crossing(
         &self,
         what: &'static str,
@@ -377,7 +383,8 @@ impl RingFlank {
         })
     }
 
-    /// `R² - (d_v + r)²`, without clearance, free of cancellation but for that of the flank itself near the threshold of undercut.
+    /// Returns `R² - (d_v + r)²`, without clearance. It is free of cancellation, except that of the flank itself near
+    /// undercut.
     fn rise_above_tip_mm2(&self, tooth: &ToothCenter) -> f64 {
         let (b, r) = (self.locus.cam_inner_radius_mm(), self.locus.tooth_radius_mm());
         let center_rise_mm2 = self.locus.cam().kind().center_rise_mm2(r, tooth);
@@ -387,7 +394,7 @@ impl RingFlank {
             + 2.0 * self.distance_mm * (center_rise_mm * point.cos_pressure_angle - (b + r) * versine(&point))
     }
 
-    /// `(d_l + r)² - R²`, without clearance, a sum of positive terms.
+    /// Returns `(d_l + r)² - R²`, without clearance, as a sum of positive terms.
     fn drop_below_root_mm2(&self, tooth: &ToothCenter) -> f64 {
         let (a, r) = (self.locus.cam_outer_radius_mm(), self.locus.tooth_radius_mm());
         let center_drop_mm2 = self.locus.cam().kind().center_drop_mm2(r, tooth);
@@ -397,7 +404,7 @@ impl RingFlank {
     }
 }
 
-/// `1 - cos β` without cancellation.
+/// Returns `1 - cos β` without cancellation.
 fn versine(point: &FlankPoint) -> f64 {
     let tan = point.tan_pressure_angle;
     let cos = point.cos_pressure_angle;

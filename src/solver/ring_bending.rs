@@ -1,8 +1,9 @@
-//! How much further the ring gives way under a tooth towards its tips than at its root (docs/theory.md section 4.3, `ring_teeth_bend`).
+//! Bending of the ring's teeth: extra compliance of the ring under a tooth compared with its root
+//! (docs/explanation/theory.md section 4.3, `ring_teeth_bend`).
 //!
-//! A force on the flank moves it as it would move a half-plane, and further, because the other faces of the ring's tooth bear nothing: what the
-//! half-plane bears there has to be taken off the ring again. That is a problem of the boundary alone, without any singularity at the force, and
-//! is solved by boundary elements: one dense system for all places of the force.
+//! A force on the flank displaces it as it would a half-plane, plus more, because the other faces of the ring's tooth
+//! are free: the half-plane's tractions there have to be removed. The extra part is a boundary problem without a
+//! singularity at the force. It is solved by boundary elements, with one dense system for all places of the force.
 
 use std::cell::Cell;
 use std::f64::consts::PI;
@@ -19,30 +20,31 @@ use boundary::{KNOTS, Piece, flank_point};
 mod boundary;
 mod solve;
 
-/// A tooth presses a stretch as wide as this part of its radius to either side, as far as contacts are: nearer to the flank's end it bends
-/// the tooth no more.
+/// Half-width of the loaded stretch of the flank, as part of the tooth's radius, as for contacts. Nearer to the flank's
+/// end than that, bending does not grow further.
 const WIDTH_SHARE: f64 = 0.02;
 
-/// What a ring gives way by under a tooth beyond what it gives way by at its root.
+/// Compliance of a ring under a tooth in excess of that at its root.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RingBending {
-    /// Where the flank ends.
+    /// End of the flank.
     end: Point2<f64>,
     width_mm: f64,
-    /// Of the contact's distance from the flank's end the logarithm, increasing; and by it the compliance in mm/N with its second derivative.
+    /// Increasing logarithms of the contact's distance from the flank's end; for each the compliance in mm/N and its
+    /// second derivative.
     ln_distance: [f64; KNOTS],
     compliance_mm_per_n: [f64; KNOTS],
     bend: [f64; KNOTS],
 }
 
 impl RingBending {
-    /// Of a drive whose ring is of a material.
+    /// Builds the compliance for a drive whose ring has this material.
     ///
     /// # Errors
     /// [`NotConverged`] from the flank.
     pub fn new(drive: &Drive, ring: &Material) -> Result<Self, NotConverged> {
         let Solved { end, ln_distance, give, .. } = Solved::of(drive, ring.poissons_ratio)?;
-        // Towards the root: the compliance is a difference from the last.
+        // Relative to the root: the compliance is a difference from the last knot.
         let root = give[KNOTS - 1];
         let per_width_mm_per_n = ring.compliance_per_mpa() / drive.tooth_width_mm();
         let compliance_mm_per_n = give.map(|give| per_width_mm_per_n * (give - root));
@@ -51,8 +53,9 @@ impl RingBending {
         Ok(Self { end, width_mm, ln_distance, compliance_mm_per_n, bend })
     }
 
-    /// Under a tooth that touches the flank at a point, in mm/N along the normal. A ring of few teeth, each as broad as the ring, may give way by less
-    /// there than at its root; that counts as nothing, for beside stiff contacts it would be more than they have.
+    /// Returns the compliance in mm/N along the normal under a tooth that touches the flank at a point. If a ring has
+    /// few teeth, each as wide as the ring, it may be less there than at the root. It then counts as 0, because a
+    /// negative value could exceed the compliance of stiff contacts.
     pub fn compliance_mm_per_n(&self, contact: Point2<f64>) -> f64 {
         let ln = (contact - self.end).norm().hypot(self.width_mm).ln();
         let at = self.ln_distance[1..KNOTS - 1].partition_point(|&knot| knot < ln);
@@ -65,24 +68,24 @@ impl RingBending {
     }
 }
 
-/// The boundary elements of a ring, solved for one Poisson's ratio. Neither load nor width nor modulus matters.
+/// Boundary elements of a ring, solved for one Poisson's ratio. The result is independent of load, width and modulus.
 #[derive(Clone, Copy)]
 struct Solved {
     ring: RingTooth,
     poissons_ratio: f64,
     end: Point2<f64>,
     ln_distance: [f64; KNOTS],
-    /// Under a force at each knot, per unit of `(1 - ν²)/E` for each unit of width, and but for the same number for all.
+    /// Displacement under a force at each knot, per unit of `(1 - ν²)/E` and unit width, up to a common constant.
     give: [f64; KNOTS],
 }
 
 thread_local! {
-    /// The last one: all loads of a drive have the same, and mostly come one after the other.
+    /// The last solution: all loads of a drive share it, and they mostly follow each other.
     static LAST: Cell<Option<Solved>> = const { Cell::new(None) };
 }
 
 impl Solved {
-    /// Solved anew only for another ring than the last.
+    /// Returns the solution, computed only if the ring differs from the last one.
     fn of(drive: &Drive, poissons_ratio: f64) -> Result<Self, NotConverged> {
         let is_same =
             |last: &Self| last.ring == *drive.ring_tooth() && last.poissons_ratio.to_bits() == poissons_ratio.to_bits();
@@ -107,7 +110,7 @@ impl Solved {
     }
 }
 
-/// The second derivatives of the natural cubic spline through points.
+/// Returns the second derivatives of the natural cubic spline through points.
 fn spline_bends(x: &[f64; KNOTS], y: &[f64; KNOTS]) -> [f64; KNOTS] {
     let mut bends = [0.0; KNOTS];
     let mut share = [0.0; KNOTS];
@@ -128,9 +131,9 @@ fn spline_bends(x: &[f64; KNOTS], y: &[f64; KNOTS]) -> [f64; KNOTS] {
 mod tests {
     use super::*;
 
-    /// A sine over half a wave has no bend at its ends, as the spline has none.
+    /// A sine over half a wave has no curvature at its ends, like the natural spline.
     #[test]
-    fn a_spline_bends_as_the_curve_whose_points_it_goes_through() {
+    fn spline_has_second_derivatives_of_sine() {
         let x: [f64; KNOTS] = std::array::from_fn(|knot| knot as f64 / (KNOTS - 1) as f64);
         let x = x.map(|x| x * (0.5 + 0.5 * x));
         let bends = spline_bends(&x, &x.map(|x| (PI * x).sin()));
@@ -140,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spline_has_one_slope_on_either_side_of_its_points_and_no_bend_at_its_ends() {
+    fn spline_is_smooth_and_natural() {
         let x: [f64; KNOTS] = std::array::from_fn(|knot| (1.0 + knot as f64).ln() + 0.1 * (knot % 3) as f64);
         let y: [f64; KNOTS] = std::array::from_fn(|knot| (2.5 * knot as f64).sin());
         let bends = spline_bends(&x, &y);

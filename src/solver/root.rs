@@ -1,23 +1,23 @@
-//! Roots of one unknown inside a bracket: the two iterations that everything else uses.
+//! Roots of one unknown inside a bracket: the iterations used by all other modules.
 
-/// An iteration that hit its cap.
+/// An iteration that reached its limit of steps.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{what}: no convergence within {iterations} iterations, the bracket is still {bracket_width} wide")]
 pub struct NotConverged {
-    /// What was solved for.
+    /// The quantity that was solved for.
     pub what: &'static str,
-    /// The cap.
+    /// Limit of steps.
     pub iterations: u32,
-    /// Width of the bracket that was left.
+    /// Width of the remaining bracket.
     pub bracket_width: f64,
 }
 
-/// Above what is ever needed: bisection takes below 60 steps, in the logarithm from the widest bracket that the ranges of the parameters
-/// allow (a/b = 1e12) as well as down to [`NOTHING`], and a bisection stands behind every step.
+/// Limit of steps, above any real need. Bisection takes below 60 steps, in the logarithm from the widest bracket in the
+/// ranges of the parameters (a/b = 1e12) as well as down to [`NOTHING`]. Every step can fall back to bisection.
 const MAX_ITERATIONS: u32 = 200;
 
-/// A root of [`bracketed`] this near to zero is zero for every purpose: its unknowns are angles in rad and shares of one. Without it a root
-/// that only rounding has put on this side of zero would be halved for without end.
+/// Absolute value below which a root of [`bracketed`] is zero: its unknowns are angles in rad and ratios. Without it,
+/// bisection towards a root at zero, moved by rounding, would not end.
 const NOTHING: f64 = 1e-16;
 
 /// A function's value and derivative.
@@ -29,8 +29,9 @@ pub struct ValueAndSlope {
     pub slope: f64,
 }
 
-/// The root in `[low, high]`, `0 < low <= high`, of a function that is negative below it and positive above, by Newton's method from `guess`, with
-/// bisection in the logarithm where a step would leave the bracket or shrink too slowly.
+/// Returns the root in `[low, high]`, `0 < low <= high`, of a function that is negative below it and positive above.
+/// The method is Newton's from `guess`, with logarithmic bisection for steps that leave the bracket or shrink too
+/// slowly.
 ///
 /// # Errors
 /// [`NotConverged`] after 200 iterations.
@@ -54,7 +55,7 @@ pub fn newton_in_bracket(
             return Ok(x);
         }
         let newton = x - value / slope;
-        // The negated comparison also catches a slope of zero, where `newton` is not a number.
+        // The negated comparison also catches a slope of zero, for which `newton` is NaN.
         let next = if !(newton >= low && newton <= high) || (newton - x).abs() > 0.5 * last_step {
             (low * high).sqrt()
         } else {
@@ -70,8 +71,9 @@ pub fn newton_in_bracket(
     Err(NotConverged { what, iterations: MAX_ITERATIONS, bracket_width: high - low })
 }
 
-/// The root of an increasing function that is straight or bent upwards, from a place at or above it: Newton's method, which then comes down
-/// to the root without passing it, needs no bracket. Places are not negative; where rounding carries a step below zero, zero is the root.
+/// Returns the root of an increasing function that is linear or convex, from a point at or above it. Newton's method
+/// then approaches the root without passing it and needs no bracket. Arguments are not negative: if rounding gives a
+/// negative step, the root is zero.
 ///
 /// # Errors
 /// [`NotConverged`] after 200 iterations, or from `function` itself.
@@ -83,7 +85,7 @@ pub fn newton_from_above(
     let mut x = start;
     for _ in 0..MAX_ITERATIONS {
         let ValueAndSlope { value, slope } = function(x)?;
-        // Below the root only rounding leads, or a start that rounding has put there: the step upwards is then its correction.
+        // Only rounding leads below the root: the upward step is its correction.
         let next = (x - value / slope).max(0.0);
         if value <= 0.0 || x - next <= f64::EPSILON * x {
             return Ok(if next.is_finite() { next } else { x });
@@ -93,8 +95,8 @@ pub fn newton_from_above(
     Err(NotConverged { what, iterations: MAX_ITERATIONS, bracket_width: x })
 }
 
-/// The root of an increasing function that is straight or bent downwards, from a positive place at or below it: as [`newton_from_above`], the other
-/// way round.
+/// Returns the root of an increasing function that is linear or concave, from a positive point at or below it, like
+/// [`newton_from_above`].
 ///
 /// # Errors
 /// [`NotConverged`] after 200 iterations.
@@ -115,8 +117,8 @@ pub fn newton_from_below(
     Err(NotConverged { what, iterations: MAX_ITERATIONS, bracket_width: x })
 }
 
-/// The root between `start`, where the function's value is known, and `end`, where it has the other sign:
-/// inverse quadratic interpolation where it is safe, bisection elsewhere (Chandrupatla 1997).
+/// Returns the root between `start`, where the function's value is known, and `end`, where it has the other sign. The
+/// method is inverse quadratic interpolation with a fallback to bisection (Chandrupatla 1997).
 ///
 /// # Errors
 /// [`NotConverged`] after 200 iterations, or from `function` itself.

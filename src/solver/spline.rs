@@ -1,4 +1,4 @@
-//! Curves as few polynomials, for what draws solids (docs/theory.md section 8).
+//! Curves as few polynomials, for what draws solids (docs/explanation/theory.md section 8).
 
 use std::f64::consts::PI;
 
@@ -176,7 +176,7 @@ mod tests {
 
     use super::*;
 
-    /// Points on a straight line at lengths that a function gives.
+    /// Returns points on a straight line at the lengths of a function.
     fn line(points: usize, at: impl Fn(f64) -> f64) -> SampledCurve {
         let places = (0..points).map(|i| i as f64 / (points - 1) as f64);
         SampledCurve {
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_polynomial_goes_through_the_points_that_are_nearest_to_chebyshevs_places() {
+    fn polynomial_passes_points_nearest_to_chebyshev_nodes() {
         for at in [|x: f64| x, |x| x * x, f64::sqrt] {
             let curve = line(1001, at);
             for inner in 1..=INNER {
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_polynomial_goes_through_all_points_where_there_are_hardly_enough() {
+    fn polynomial_passes_all_points_of_short_curve() {
         for at in [|x: f64| x, |x: f64| x.powi(8), |x: f64| x.powf(0.125)] {
             let curve = line(8, at);
             let measured = MeasuredCurve::new(&curve);

@@ -1,53 +1,56 @@
-//! Load sharing (docs/theory.md section 4.5): which rotation of the wave generator makes its torque, over springs, one a tooth. It knows
-//! neither geometry nor shape.
+//! Load sharing (docs/explanation/theory.md section 4.5): the rotation of the wave generator that balances its torque,
+//! with one spring for each tooth. It is independent of geometry and tooth shape.
 
 use std::f64::consts::PI;
 
 use crate::approach::Approach;
 use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_from_above};
 
-/// A spring that is pressed by less is not pressed at all. The least torque of all presses some tooth by 1e-60 mm or more, so this share of the load
-/// is none; and a law's logarithm and slope would leave the range of doubles.
+/// Displacement below which a spring carries nothing. The least torque displaces some tooth by 1e-60 mm or more, so the
+/// neglected load is negligible. Smaller values would leave the range of doubles in a law's logarithm and slope.
 const NOTHING_MM: f64 = 1e-200;
 
-/// No search for a rotation has to go as far as this; a lobe is no wider than a turn.
+/// Upper bound of every search for a rotation; a lobe is no wider than a turn.
 const FARTHEST_RAD: f64 = 2.0 * PI;
 
-/// A tooth as load sharing sees it.
+/// A tooth in load sharing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spring {
-    /// Way along `F_H` for each radian that the wave generator turns once the gaps are closed: `|h'|` by kinematics.
+    /// Displacement along `F_H` for each radian of the wave generator, gaps closed: `|h'|` by kinematics.
     pub travel_arm_mm: f64,
-    /// Torque at the wave generator for each newton of `F_H` then: `|h'|` by statics. Friction will part the two.
+    /// Torque at the wave generator for each newton of `F_H`, gaps closed: `|h'|` by statics. Friction would make them
+    /// differ.
     pub static_arm_mm: f64,
-    /// How much shorter both become for each radian that the wave generator turns further, moving on under the tooth; nothing where it counts as standing still.
+    /// Decrease of both arms for each further radian of the wave generator; 0 if lever arms do not vary with wind-up.
     pub arm_decline_mm_per_rad: f64,
-    /// How far the wave generator turns before the gaps at this tooth are closed, `g/|h'|`; infinite where they never are. Lost motion that
-    /// all teeth have alike may be left out, and then what is left may be below zero.
+    /// Rotation of the wave generator until the gaps at this tooth are closed, `g/|h'|`; infinite if they never close.
+    /// Lost motion common to all teeth may be excluded; the rest may be negative.
     pub closing_rad: f64,
-    /// The tooth's approach under `F_H`.
+    /// Approach of the tooth under `F_H`.
     pub approach: Approach,
 }
 
-/// What has to be closed before a tooth carries: the wave generator makes up for the lost motion, and then, by what is left of the arm, for the way.
+/// Gap to close before a tooth carries. The wave generator first takes up the lost motion, then the distance with the
+/// arm that is left.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gap {
-    /// Along `F_H`.
+    /// Distance along `F_H`.
     pub(crate) along_mm: f64,
-    /// As a rotation of the wave generator.
+    /// Lost motion, as a rotation of the wave generator.
     pub(crate) lost_motion_rad: f64,
 }
 
-/// How far the wave generator turns until a gap is closed, and the arm that is left then.
+/// Rotation of the wave generator that closes a gap, and the arm at that point.
 struct Closing {
     rad: f64,
     arm_mm: f64,
 }
 
 impl Gap {
-    /// Where the tooth has this arm as the wave generator has made up for so much lost motion.
+    /// Returns the closing rotation of a tooth whose arm applies after this common lost motion.
     fn closing(&self, arm_mm: f64, usual_rad: f64, arm_decline_mm_per_rad: f64) -> Closing {
-        // Backwards, where lost motion of all teeth makes up for it, no farther than to where an arm that grows begins.
+        // If the common lost motion exceeds the gap, the rotation is negative, at most back to where a growing arm
+        // begins.
         let begin_rad = |arm_mm: f64| {
             if arm_decline_mm_per_rad < 0.0 { arm_mm / arm_decline_mm_per_rad } else { f64::NEG_INFINITY }
         };
@@ -63,9 +66,9 @@ impl Gap {
 }
 
 impl Spring {
-    /// A tooth with a gap, nothing where it has none, and the same arm in travel and statics, as it has when the wave generator has made up for lost motion that is usual. One
-    /// without an arm never closes a gap: that of the slot vanishes with the arm, but no rotation brings the tooth there, unless it lends the tooth an arm. Nor does one whose
-    /// arm ends before.
+    /// Builds the spring of a tooth with a gap (or none) and one arm for travel and statics. The arm applies after the
+    /// common lost motion. A tooth without an arm never closes a gap, unless the arm grows with the rotation. A tooth
+    /// whose arm becomes zero first does not close it either.
     pub(crate) fn new(
         arm_mm: f64,
         usual_rad: f64,
@@ -78,19 +81,20 @@ impl Spring {
         Self { travel_arm_mm: arm_mm, static_arm_mm: arm_mm, arm_decline_mm_per_rad, closing_rad, approach }
     }
 
-    /// What is turned beyond the closing angle, so that no digits are lost to that; below nothing while a gap is open.
+    /// Returns the rotation beyond the closing angle without loss of digits; negative while a gap is open.
     fn closed_rad(&self, wind_up: &Rotation) -> f64 {
         wind_up.excess_rad - (self.closing_rad - wind_up.closing_rad)
     }
 
-    /// `(Δφ - θ) (|h'| - c (Δφ - θ)/2)` from the closing angle θ on, c being the decline of the arm that is left there, and nothing before.
+    /// Returns `(Δφ - θ) (|h'| - c (Δφ - θ)/2)` beyond the closing angle θ, with c the decline of the arm there; 0
+    /// before.
     pub fn displacement_mm(&self, wind_up: &Rotation) -> f64 {
         let closed_rad = self.closed_rad(wind_up);
         let displacement_mm = closed_rad * (self.travel_arm_mm - 0.5 * self.arm_decline_mm_per_rad * closed_rad);
         if closed_rad > 0.0 && displacement_mm > NOTHING_MM { displacement_mm } else { 0.0 }
     }
 
-    /// What is turned beyond the closing angle when the tooth is displaced so far; without end where it never is.
+    /// Returns the rotation beyond the closing angle at a displacement; infinite if it is never reached.
     pub(crate) fn excess_rad(&self, displacement_mm: f64) -> f64 {
         if self.arm_decline_mm_per_rad == 0.0 {
             return displacement_mm / self.travel_arm_mm;
@@ -98,7 +102,7 @@ impl Spring {
         turned_rad(self.travel_arm_mm, self.arm_decline_mm_per_rad, displacement_mm)
     }
 
-    /// Torque at the wave generator for each newton of `F_H` when it has turned.
+    /// Returns the torque at the wave generator for each newton of `F_H` at a rotation.
     pub fn turned_static_arm_mm(&self, wind_up: &Rotation) -> f64 {
         self.turned_arm_mm(self.static_arm_mm, wind_up)
     }
@@ -107,7 +111,7 @@ impl Spring {
         self.turned_arm_mm(self.travel_arm_mm, wind_up)
     }
 
-    /// Of a tooth whose gap never closes, nothing is known but the arm without load.
+    /// A gap that never closes leaves the unloaded arm.
     fn turned_arm_mm(&self, arm_mm: f64, wind_up: &Rotation) -> f64 {
         if self.closing_rad.is_finite() {
             arm_mm - self.arm_decline_mm_per_rad * self.closed_rad(wind_up)
@@ -116,7 +120,7 @@ impl Spring {
         }
     }
 
-    /// `F_H`; nothing while a gap is open.
+    /// Returns `F_H`; 0 while a gap is open.
     ///
     /// # Errors
     /// [`NotConverged`] from the law's inverse.
@@ -125,7 +129,7 @@ impl Spring {
         if displacement_mm > 0.0 { Ok(self.approach.force(displacement_mm)?.force_n) } else { Ok(0.0) }
     }
 
-    /// The force under a displacement, and its derivative.
+    /// Returns the force under a displacement, and its derivative.
     fn force_and_stiffness(&self, displacement_mm: f64) -> Result<ValueAndSlope, NotConverged> {
         if displacement_mm <= 0.0 {
             return Ok(ValueAndSlope { value: 0.0, slope: 0.0 });
@@ -134,8 +138,9 @@ impl Spring {
         Ok(ValueAndSlope { value: force.force_n, slope: force.force_n / (displacement_mm * force.exponent) })
     }
 
-    /// Whether the spring's torque surely grows all the way up to a rotation, or is none. Its slope `h'² dF_H/dξ - c F_H` is not below nothing where `h'² ≥ c ξ`, as the force grows
-    /// with the displacement faster than in proportion; and once that is less it stays so.
+    /// Returns true if the spring's torque certainly grows up to a rotation, or is zero. Its slope
+    /// `h'² dF_H/dξ - c F_H` is not negative if `h'² ≥ c ξ`, because the force grows faster than the displacement. Once
+    /// that fails, it fails for larger rotations too.
     fn helps_up_to(&self, rotation: &Rotation) -> bool {
         if !self.can_carry() || self.closing_rad - rotation.closing_rad >= rotation.excess_rad {
             return true;
@@ -148,15 +153,16 @@ impl Spring {
         self.travel_arm_mm > 0.0 && self.static_arm_mm > 0.0
     }
 
-    /// Whether some rotation makes the spring carry a torque.
+    /// Returns true if some rotation makes the spring carry a torque.
     pub(crate) const fn can_carry(&self) -> bool {
         (self.has_arms() || self.arm_decline_mm_per_rad < 0.0) && self.closing_rad.is_finite()
     }
 }
 
-/// The rotation that makes a way along `F_H` by an arm that declines, `Δφ |h'| - c Δφ²/2`; without end where the arm ends before.
+/// Returns the rotation for a displacement along `F_H` with a declining arm, `Δφ |h'| - c Δφ²/2`; infinite if the arm
+/// ends before.
 fn turned_rad(arm_mm: f64, arm_decline_mm_per_rad: f64, way_mm: f64) -> f64 {
-    // Also where there is no arm to begin with.
+    // Also if the initial arm is zero.
     if way_mm == 0.0 {
         return 0.0;
     }
@@ -173,45 +179,45 @@ impl AsRef<Self> for Spring {
     }
 }
 
-/// `Δφ` in two parts. Under a light load what is turned beyond the last closing angle is small against the clearances, and yet makes
-/// the forces: in a single number it would lose its digits.
+/// `Δφ` in two parts. Under a light load the rotation beyond the last closing angle is small relative to the
+/// clearances, but determines the forces. A single number would lose its digits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation {
-    /// Where the last of the teeth that carry closed its gaps.
+    /// Closing angle of the last tooth that carries.
     pub closing_rad: f64,
-    /// What is turned beyond that, not negative: so every tooth that carries is pressed by a sum of positive terms.
+    /// Rotation beyond that, not negative. The displacement of every carrying tooth is then a sum of positive terms.
     pub excess_rad: f64,
 }
 
-/// Where the torque of springs whose arms decline is highest.
+/// Maximum of the torque of springs with declining arms.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Summit {
     pub(crate) rotation: Rotation,
     pub(crate) torque_nmm: f64,
-    /// Whether it is where the looking ended, and the torque may still rise.
+    /// True if the search ended there, so that the torque may still rise.
     is_end: bool,
 }
 
-/// How far the wave generator turns under the load at one input angle, and how stiffly.
+/// Wind-up of the wave generator under the load at one input angle, and the stiffness.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindUp {
-    /// Lost motion that all springs have alike, which their closing angles leave out.
+    /// Lost motion common to all springs, which their closing angles exclude.
     pub lost_motion_rad: f64,
-    /// `Δφ` beyond it.
+    /// `Δφ` beyond the lost motion.
     pub rotation: Rotation,
     /// `dM0/dΔφ` at the load.
     pub stiffness_nmm_per_rad: f64,
 }
 
 impl Rotation {
-    /// `Δφ`.
+    /// Returns `Δφ`.
     pub const fn rad(&self) -> f64 {
         self.closing_rad + self.excess_rad
     }
 }
 
 impl WindUp {
-    /// `Δφ`.
+    /// Returns `Δφ`, including the lost motion.
     pub const fn rotation_rad(&self) -> f64 {
         self.lost_motion_rad + self.rotation.rad()
     }
@@ -225,7 +231,7 @@ pub struct Springs<'a, S> {
 }
 
 impl<'a, S: AsRef<Spring>> Springs<'a, S> {
-    /// The teeth of one of so many zones that are alike; all teeth, where zones are not, count as one zone.
+    /// Builds the springs of one zone of `zones` that are alike. If zones are not alike, all teeth count as one zone.
     pub const fn new(springs: &'a [S], zones: f64) -> Self {
         Self { springs, zones }
     }
@@ -234,7 +240,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         self.springs.iter().map(AsRef::as_ref)
     }
 
-    /// The torque `U Σ F_H |h'|` \[2\], and its derivative by `Δφ`.
+    /// Returns the torque `U Σ F_H |h'|` \[2\], and its derivative by `Δφ`.
     ///
     /// # Errors
     /// [`NotConverged`] from a law's inverse.
@@ -254,10 +260,11 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Ok(torque)
     }
 
-    /// The `Δφ` under which the springs make a torque; nothing where none of them has an arm, or where arms that decline end before.
+    /// Returns the `Δφ` at which the springs balance a torque. Returns none if no spring has an arm, or if declining
+    /// arms end before.
     ///
     /// # Errors
-    /// [`NotConverged`] where the equation that is left is not solved.
+    /// [`NotConverged`] if the remaining equation is not solved.
     pub fn wind_up(&self, torque_nmm: f64) -> Result<Option<WindUp>, NotConverged> {
         if !self.iter().any(Spring::has_arms) {
             return Ok(None);
@@ -269,7 +276,8 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Ok(Some(WindUp { lost_motion_rad: 0.0, rotation, stiffness_nmm_per_rad }))
     }
 
-    /// A rotation that makes the torque, the only one where arms do not decline; up to a summit that makes it, the first.
+    /// Returns the rotation that balances the torque. Up to a given maximum that exceeds the torque, it is the first
+    /// rotation.
     fn rotation(&self, torque_nmm: f64, summit: Option<&Rotation>) -> Result<Option<Rotation>, NotConverged> {
         if self.iter().all(|spring| spring.closing_rad == 0.0) {
             let excess_rad = match self.gapless_rad(torque_nmm) {
@@ -288,8 +296,8 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Springs::new(&order, self.zones).rotation_in_order(torque_nmm, summit)
     }
 
-    /// The first rotation that makes the torque where arms decline, given one that does, if any was found: the torque need not rise up to there. Nothing
-    /// where no summit of the torque is as high.
+    /// Returns the first rotation that balances the torque if arms decline, given one that does (if found): the torque
+    /// need not rise monotonically. Returns none if every maximum of the torque is lower.
     fn first_rotation(&self, torque_nmm: f64, found: Option<Rotation>) -> Result<Option<Rotation>, NotConverged> {
         let summit = match found {
             Some(found) if self.iter().all(|spring| spring.helps_up_to(&found)) => return Ok(Some(found)),
@@ -299,12 +307,13 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         match found {
             Some(found) if summit.is_end => Ok(Some(found)),
             _ if summit.torque_nmm < torque_nmm => Ok(None),
-            // Of the summit's own torque rounding may leave none before it.
+            // At the maximum's own torque, rounding may leave no earlier rotation.
             _ => Ok(self.rotation(torque_nmm, Some(&summit.rotation))?.or(Some(summit.rotation))),
         }
     }
 
-    /// The highest torque before a rotation, or at all where none is given, if it is more than what that rotation makes: none where arms do not decline.
+    /// Returns the largest torque before a rotation (or anywhere) if it exceeds that of the rotation; none if arms do
+    /// not decline.
     ///
     /// # Errors
     /// [`NotConverged`] from a law's inverse.
@@ -316,7 +325,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Ok((!summit.is_end && summit.torque_nmm > 0.0).then_some(summit))
     }
 
-    /// Where the first spring closes.
+    /// Returns the closing angle of the first spring.
     fn first_closing_rad(&self) -> f64 {
         let closings_rad = self.iter().filter(|spring| spring.can_carry()).map(|spring| spring.closing_rad);
         closings_rad.reduce(f64::min).unwrap_or(0.0)
@@ -326,10 +335,12 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Rotation { closing_rad: self.first_closing_rad(), excess_rad: FARTHEST_RAD }
     }
 
-    /// The first summit of the torque over the rotation, on the way from none to `end`, that makes enough, or else the highest. The way is over at a summit at which
-    /// no spring has a gap left to close; one before that is passed, as the wave generator then comes to springs that hold it again, if only once they are pressed.
+    /// Returns the first maximum of the torque, up to `end`, that is at least `enough_nmm`, or else the highest. The
+    /// search ends at a maximum after which no gap is left to close. An earlier maximum is passed, because the wave
+    /// generator then meets further springs.
     fn summit(&self, end: &Rotation, enough_nmm: f64) -> Result<Summit, NotConverged> {
-        /// Where a stretch is this short against the way up to it, its ends tell whether the torque rises: at the summit it differs by the square.
+        /// Relative length of an interval whose ends show if the torque rises: at the maximum the torque varies by its
+        /// square.
         const SHORTEST: f64 = 1e-9;
         let first_rad = self.first_closing_rad();
         let at = |excess_rad: f64| Rotation { closing_rad: first_rad, excess_rad };
@@ -338,7 +349,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         let end_rad = end.excess_rad + (end.closing_rad - first_rad);
         let mut summit = Summit { rotation: at(0.0), torque_nmm: 0.0, is_end: false };
         let (mut near_rad, mut near_nmm, mut rises, mut step_rad) = (0.0, 0.0, true, end_rad);
-        // By rounding, the shortest stretches at a minimum have summits of their own.
+        // By rounding, the shortest intervals at a minimum have maxima of their own.
         let mut surely_rises = true;
         while near_rad < end_rad {
             let far_rad = end_rad.min(near_rad + step_rad);
@@ -365,10 +376,11 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Ok(if is_end { Summit { rotation: *end, torque_nmm: near_nmm, is_end } } else { summit })
     }
 
-    /// Whether the torque surely rises all along a stretch of the rotation, or surely falls; nothing where it may do either.
+    /// Returns true if the torque certainly rises over an interval of the rotation, false if it certainly falls,
+    /// otherwise none.
     ///
-    /// A spring's part `F_H |h'|` has the slope `h'² dF_H/dξ - c F_H`. As force and stiffness grow with the displacement, the least and the largest of that and of the
-    /// arm bound it.
+    /// The term `F_H |h'|` of a spring has the slope `h'² dF_H/dξ - c F_H`. Force and stiffness grow with the
+    /// displacement, so the extremes of these and of the arm bound the slope.
     fn trend(&self, near: &Rotation, far: &Rotation) -> Result<Option<bool>, NotConverged> {
         let (mut least, mut most) = (0.0, 0.0);
         for spring in self.iter().filter(|spring| spring.can_carry()) {
@@ -400,9 +412,10 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         })
     }
 
-    /// The rotation of springs that stand in the order in which they close. A spring carries if those before it make less than the torque when
-    /// it closes; since the torque grows with the rotation, or is less up to the one that is looked for and no less from there to the summit, halving finds the
-    /// last one. (Where no summit is known and arms decline so much that it does not, halving still ends between one that makes less and one that makes more.)
+    /// Returns the rotation of springs sorted by closing angle. A spring carries if the springs before it balance less
+    /// than the torque when it closes. Bisection finds the last one, because the torque crosses the required value once
+    /// up to the given maximum. If no maximum is known and the torque is not monotonic, bisection still ends between
+    /// two springs that bracket the torque.
     fn rotation_in_order(&self, torque_nmm: f64, summit: Option<&Rotation>) -> Result<Option<Rotation>, NotConverged> {
         if self.springs.is_empty() {
             return Ok(None);
@@ -422,26 +435,26 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         let next =
             self.springs.get(carrying).map(|next| Rotation { closing_rad: next.as_ref().closing_rad, excess_rad: 0.0 });
         let carrying = Self { springs: &self.springs[..carrying], ..*self };
-        // By themselves these make the torque where the next one closes, and may make less beyond.
+        // These springs balance the torque at the next closing angle, and may balance less beyond.
         let end = next.as_ref().or(summit);
         let excess_rad = carrying.excess_rad(closing_rad, torque_nmm, end)?;
         let excess_rad = excess_rad.or_else(|| Some(next?.closing_rad - closing_rad));
         Ok(excess_rad.map(|excess_rad| Rotation { closing_rad, excess_rad }))
     }
 
-    /// Whether any arm declines: then no force is in proportion to a power of the rotation.
+    /// Returns true if any arm declines; then no force is proportional to a power of the rotation.
     fn has_declining_arms(&self) -> bool {
         self.iter().any(|spring| spring.arm_decline_mm_per_rad != 0.0)
     }
 
-    /// The exponent of all springs, if they have one in common.
+    /// Returns the common exponent of all springs, if there is one.
     fn common_exponent(&self) -> Option<f64> {
         let mut exponents = self.iter().map(|spring| spring.approach.single_exponent());
         let first = exponents.next()??;
         exponents.all(|exponent| exponent == Some(first)).then_some(first)
     }
 
-    /// The rotation without gaps, `(M0/(U Σ |h'| (|h'|/c)^(1/p)))^p`; none where there is no common exponent p.
+    /// Returns the rotation without gaps, `(M0/(U Σ |h'| (|h'|/c)^(1/p)))^p`; none without a common exponent p.
     fn gapless_rad(&self, torque_nmm: f64) -> Option<f64> {
         let exponent = self.common_exponent().filter(|_| !self.has_declining_arms())?;
         let torque_of_unit = self.iter().map(|spring| {
@@ -449,7 +462,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
             match spring.approach {
                 Approach::Power { coefficient, .. } => arm * (travel / coefficient).powf(1.0 / exponent),
                 Approach::Linear { compliance_mm_per_n } => arm * (travel / compliance_mm_per_n),
-                // Has no exponent.
+                // No exponent.
                 Approach::Logarithmic(_) | Approach::Corner(_) => 0.0,
             }
         });
@@ -457,10 +470,11 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Some(if exponent < 1.0 { share.powf(exponent) } else { share })
     }
 
-    /// What is turned beyond `closing_rad`, the last closing angle, for springs that all carry.
+    /// Returns the rotation beyond `closing_rad`, the last closing angle, for springs that all carry.
     ///
-    /// Closed for a linear law. Otherwise Newton's method from above: each spring's force, and so the torque, is increasing and bent upwards in the
-    /// excess, since its approach is bent downwards in the force. Where arms decline it may be bent either way.
+    /// A linear law has a closed form. Other laws use Newton's method from above: each force, and so the torque, is
+    /// increasing and convex in the rotation, since the approach is concave in the force. With declining arms it may be
+    /// neither.
     fn excess_rad(
         &self,
         closing_rad: f64,
@@ -488,8 +502,8 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         .map(Some)
     }
 
-    /// The same where arms decline: between the last of some places, each twice as far as the one before, that make less than the torque and the first
-    /// that does not, none farther than the most. Nothing where none does.
+    /// Returns the same for declining arms. It doubles the rotation, up to a maximum, until the torque is reached, and
+    /// then solves within the last interval. Returns none if the torque is not reached.
     fn bracketed_excess_rad(
         &self,
         closing_rad: f64,
@@ -498,7 +512,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
     ) -> Result<Option<f64>, NotConverged> {
         let lacking =
             |excess_rad: f64| Ok(self.torque_nmm(&Rotation { closing_rad, excess_rad })?.value / torque_nmm - 1.0);
-        // Springs that have no arm to begin with have no guess either.
+        // Springs without an initial arm give no estimate.
         let guess_rad = self.most_excess_rad(closing_rad, torque_nmm)?;
         let mut far_rad = if guess_rad > 0.0 { guess_rad.min(most_rad) } else { most_rad };
         let mut near = lacking(0.5 * far_rad)?;
@@ -507,7 +521,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
             near = lacking(0.5 * far_rad)?;
         }
         if far_rad <= 0.0 {
-            // The last closing angle itself makes the torque, to the last digit.
+            // The last closing angle itself balances the torque, to the last digit.
             return Ok(Some(0.0));
         }
         let (mut near_rad, mut far) = (0.5 * far_rad, lacking(far_rad)?);
@@ -524,12 +538,13 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         Ok(Some(share * far_rad))
     }
 
-    /// An excess that surely makes the torque: the lesser of two.
+    /// Returns a rotation that certainly reaches the torque: the lesser of two bounds.
     fn most_excess_rad(&self, closing_rad: f64, torque_nmm: f64) -> Result<f64, NotConverged> {
-        /// Springs with less than this share of the longest arm are left to the others: they would need a long way for a small torque.
+        /// Springs with less than this share of the longest arm are left out: they would need a large rotation for a
+        /// small torque.
         const ARM_SHARE: f64 = 0.25;
-        // However the torque is shared out, a rotation at which every spring bears its part at least, even without what it closed before, is enough.
-        // Forces by arm are near to the true ones.
+        // For any distribution of the torque, a rotation at which every spring carries its part, ignoring its earlier
+        // closing, is sufficient. Forces proportional to the arm are close to the true ones.
         let longest_mm = self.iter().map(|spring| spring.static_arm_mm).fold(0.0, f64::max);
         let shares =
             || self.iter().filter(move |spring| spring.has_arms() && spring.static_arm_mm >= ARM_SHARE * longest_mm);
@@ -538,7 +553,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         let by_share_rad = shares()
             .map(|spring| spring.approach.approach_mm(force_per_arm * spring.static_arm_mm) / spring.travel_arm_mm)
             .fold(0.0, f64::max);
-        // Bent upwards, the torque lies above its tangent where the last gap closes.
+        // The torque is convex, so it exceeds its tangent at the last closing angle.
         let at_closing = self.torque_nmm(&Rotation { closing_rad, excess_rad: 0.0 })?;
         let by_tangent_rad = (torque_nmm - at_closing.value) / at_closing.slope;
         Ok(if by_tangent_rad >= 0.0 { by_share_rad.min(by_tangent_rad) } else { by_share_rad })

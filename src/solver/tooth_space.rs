@@ -1,4 +1,5 @@
-//! The ring's tooth space as it is made: its flank set back by a clearance and shaped by a modification (docs/theory.md section 8).
+//! Tooth space of the ring as made: its flank offset by a clearance and shaped by a modification
+//! (docs/explanation/theory.md section 8).
 
 use nalgebra::{Point2, Unit, Vector2};
 
@@ -11,33 +12,33 @@ use crate::root::{NotConverged, bracketed};
 use crate::violation::{Modified, Violation};
 use crate::{SolveError, Stop};
 
-/// One tooth space of the ring, which is symmetric.
+/// One symmetric tooth space of the ring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ToothSpace {
-    /// The flank as its distance from the path sets it back, and, as far as no more than that shapes it, what ends it.
+    /// The flank offset by its distance from the path, and its end if nothing else shapes it.
     set_back: RingTooth,
     shaped: Option<ShapedSpace>,
 }
 
-/// What ends a space at the ring's tip.
+/// End of a space at the ring's tip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Tip {
     pub(crate) radius_mm: f64,
-    /// Whether the tip is an arc of this radius, and not a point or a regular place of the curve.
+    /// True if the tip is an arc of this radius; false for a point or a regular point of the curve.
     pub(crate) has_land: bool,
 }
 
 /// Half a tooth space from its middle outward, the mirror image of the other half.
 pub(crate) struct HalfSpace {
-    /// Half the angle of the arc that joins turned flanks at the root.
+    /// Half the angle of the arc that joins rotated flanks at the root.
     pub(crate) root_arc_rad: f64,
-    /// Whether the two flanks are one smooth curve at the root.
+    /// True if the two flanks are one smooth curve at the root.
     pub(crate) is_smooth_at_root: bool,
-    /// The flank, in two pieces where a tip relief starts.
+    /// The flank, in two pieces if it contains the start of a tip relief.
     pub(crate) pieces: Vec<SampledCurve>,
 }
 
-/// A flank that more shapes than its distance from the path, from where it starts to where it ends.
+/// A flank that is shaped by more than its distance from the path, from start to end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ShapedSpace {
     flank: ShapedFlank,
@@ -47,7 +48,7 @@ struct ShapedSpace {
     outermost_radius_mm: f64,
 }
 
-/// What shapes a flank besides its distance.
+/// Shape of a flank in addition to its distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ShapedFlank {
     flank: RingFlank,
@@ -57,7 +58,7 @@ struct ShapedFlank {
     relief: Option<Relief>,
 }
 
-/// A tip relief beside the drive's own flank.
+/// A tip relief relative to the drive's own flank.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Relief {
     amount_mm: f64,
@@ -69,36 +70,37 @@ struct Relief {
 /// A shaped flank at one position.
 struct ShapedPoint {
     radius_mm: f64,
-    /// From the middle of the space.
+    /// Angle from the middle of the space.
     angle_rad: f64,
-    /// From the symmetry line of the ring's tooth: with all its digits near the tip.
+    /// Angle from the symmetry line of the ring's tooth, with all its digits near the tip.
     angle_from_tip_rad: f64,
     tangent: Unit<Vector2<f64>>,
-    /// How fast the curve runs along the path's tangent, by position: not positive beyond a cusp.
+    /// Derivative of the curve along the path's tangent, by position; not positive beyond a cusp.
     speed_mm: f64,
     distance_mm: f64,
 }
 
-/// Places at which a shaped flank is looked at for its end, over half a lobe: far more than it has bends.
+/// Number of positions over half a lobe at which the end of a shaped flank is searched for: far more than its
+/// inflections.
 const PLACES: u32 = 720;
 
-/// How near to its start a relief's summit is looked for: down to 2^-60 of the distance between places.
+/// Number of halvings towards the start of a relief in the search for its maximum, from the distance between positions.
 const HALVINGS: i32 = 60;
 
-/// Golden sections that close in on a summit: to a millionth of the bracket, on a radius by less than rounding.
+/// Golden-section steps towards a maximum: to a millionth of the bracket, which changes a radius by less than rounding.
 const SECTIONS: u32 = 30;
 
-/// Where a shaped flank's direction is looked at on either side of a point, to tell how it bends there.
+/// Distance of the points on either side of a point, between which a shaped flank's curvature is measured.
 const BESIDE_SHARE_OF_HALF_LOBE: f64 = 1e-5;
 
-/// What rounding may add to a radius.
+/// Factor for rounding of a radius.
 const ROUNDED: f64 = 1.0 + 1e-12;
 
-/// What may end a shaped flank; a regular tip does where it has become a cusp.
+/// Possible ends of a shaped flank; a regular tip is one if it has become a cusp.
 const ENDS: [FlankEnd; 3] = [FlankEnd::Undercut, FlankEnd::Bore, FlankEnd::RegularTip];
 
 impl ToothSpace {
-    /// The space of a ring with a clearance and a modification.
+    /// Builds the space of a ring with a clearance and a modification.
     ///
     /// # Errors
     /// A modification that leaves no flank, and [`NotConverged`] from the geometry.
@@ -107,7 +109,7 @@ impl ToothSpace {
             DriveError::Impossible(vec![Violation::ModificationLeavesNothing { modified, value, limit }])
         };
         let bore_mm = drive.parameters().tip_radius_mm;
-        // The flank lies outside the path, and its root outside the bore.
+        // The flank is outside the path, and its root outside the bore.
         let beside_bore_mm = bore_mm.map_or(f64::NEG_INFINITY, |bore_mm| bore_mm - drive.root_radius_mm());
         let least_set_back_mm = beside_bore_mm.max(-drive.parameters().tooth_radius_mm);
         let equidistant_mm = MM_PER_UM * modification.ring_equidistant_um;
@@ -135,22 +137,23 @@ impl ToothSpace {
         }
     }
 
-    /// The flank at its distance from the path, whatever else shapes it.
+    /// Returns the flank at its distance from the path, without other shaping.
     pub(crate) const fn set_back_flank(&self) -> &RingFlank {
         &self.set_back.flank
     }
 
-    /// Whether both flanks end where they cross, though those of the drive reach a regular tip: by their distance from the path alone.
+    /// Returns true if both flanks end at their crossing because of their distance from the path, although the drive's
+    /// reach a regular tip.
     pub(crate) fn is_undercut_by_distance(&self) -> bool {
         self.set_back.limit.end == FlankEnd::Undercut
     }
 
-    /// The largest radius of the space: that of the root, or what a tip relief reaches beyond it.
+    /// Returns the largest radius of the space: that of the root, or of a tip relief beyond it.
     pub(crate) fn outermost_radius_mm(&self) -> f64 {
         self.shaped.map_or_else(|| self.set_back.flank.root_radius_mm(), |shaped| shaped.outermost_radius_mm)
     }
 
-    /// What ends it.
+    /// Returns its end at the tip.
     pub(crate) fn tip(&self) -> Tip {
         match &self.shaped {
             Some(shaped) => shaped.tip,
@@ -158,7 +161,7 @@ impl ToothSpace {
         }
     }
 
-    /// Its half.
+    /// Returns one half of it.
     pub(crate) fn half(&self, density: Density, stop: &dyn Stop) -> Result<HalfSpace, SolveError> {
         let Some(ShapedSpace { flank, start, end, .. }) = &self.shaped else {
             let pieces = vec![flank_curve(&self.set_back.flank, &self.set_back.limit, density, stop)?];
@@ -180,7 +183,7 @@ impl ToothSpace {
             }
             Some(_) => piece(*start, *end, true)?,
         }
-        // A relief of a power above one starts along the curve.
+        // A relief with a power above one starts along the curve.
         let starts_bent = flank.relief.is_some_and(|relief| relief.start_rad == 0.0 && relief.power <= 1.0);
         Ok(HalfSpace {
             root_arc_rad: flank.turned_rad.max(0.0),
@@ -191,7 +194,7 @@ impl ToothSpace {
 }
 
 impl ShapedFlank {
-    /// The flank, where anything but its distance shapes it.
+    /// Builds the flank if more than its distance shapes it.
     fn new(drive: &Drive, flank: RingFlank, modification: &Modification) -> Option<Self> {
         let relief = modification.ring_tip_relief.filter(|relief| relief.amount_um != 0.0);
         let shaped = Self {
@@ -210,7 +213,8 @@ impl ShapedFlank {
         is_shaped.then_some(shaped)
     }
 
-    /// Distance from the path and its derivative by ψ; `is_relieved` says which, where the relief starts.
+    /// Returns the distance from the path and its derivative by ψ. `is_relieved` selects the side at the start of the
+    /// relief.
     fn distance_mm(&self, position: &Position, is_relieved: bool) -> (f64, f64) {
         let plain_mm = self.flank.distance_mm();
         let Some(Relief { amount_mm, start_rad, length_rad, power }) = self.relief.filter(|_| is_relieved) else {
@@ -220,8 +224,8 @@ impl ShapedFlank {
         (plain_mm + amount_mm * share.powf(power), amount_mm * power * share.powf(power - 1.0) / length_rad)
     }
 
-    /// The flank at a position: the parallel curve, at its distance, of the path shifted along its radii, moved along its own radii and
-    /// turned. With `ρ = d + Δ` and `tan β' = kTd/ρ` its point is `ρ e(ψ/k) + D e(ψ/k + β')`.
+    /// Returns the flank at a position. The path is shifted along its radii; its parallel curve is then moved along its
+    /// own radii and rotated. With `ρ = d + Δ` and `tan β' = kTd/ρ` its point is `ρ e(ψ/k) + D e(ψ/k + β')`.
     fn at(&self, position: Position, is_relieved: bool) -> Result<ShapedPoint, NotConverged> {
         let tooth = self.flank.locus().at(position)?;
         let k = self.flank.teeth_per_wave();
@@ -240,16 +244,16 @@ impl ShapedFlank {
         let (along_mm, across_mm) = (path_radius_mm + distance_mm * cos, distance_mm * tan * cos);
         let lead_rad = across_mm.atan2(along_mm);
         let radius_mm = along_mm.hypot(across_mm);
-        // The curve's direction against the radius of its point, which stands `lead` before the path's.
+        // Direction of the curve relative to the radius of its point, which is ahead of the path's by `lead`.
         let normal_rad = tan.atan() - lead_rad;
         let (sin_normal, cos_normal) = normal_rad.sin_cos();
         let (outward, around) = if growth_mm.is_finite() {
             (growth_mm * cos_normal - speed_mm * sin_normal, growth_mm * sin_normal + speed_mm * cos_normal)
         } else {
-            // A relief of a power below one starts along the normal.
+            // A relief with a power below one starts along the normal.
             (growth_mm.signum() * cos_normal, growth_mm.signum() * sin_normal)
         };
-        // A shift along the radii stretches what runs across them.
+        // A shift along the radii stretches the component across them.
         let around = around * ((radius_mm + self.profile_shift_mm) / radius_mm);
         let angle_rad = position.from_lobe_rad / k + lead_rad + self.turned_rad;
         let (sin, cos) = angle_rad.sin_cos();
@@ -264,8 +268,8 @@ impl ShapedFlank {
         })
     }
 
-    /// A point of the piece between two positions. Its bend is by how much the curve's direction turns from just before to just behind it: what a relief adds to the
-    /// curvature has no closed form without another derivative of T.
+    /// Returns a point of the piece between two positions. Its curvature is the change of direction from just before to
+    /// just behind it: a closed form with relief would need another derivative of T.
     fn curve_point(
         &self,
         position: Position,
@@ -283,8 +287,9 @@ impl ShapedFlank {
         Ok(CurvePoint { point, tangent: at.tangent, bend: before.perp(&behind) })
     }
 
-    /// The largest radius from start to end. The flank falls from its start, and a relief that grows outward may carry it up again: by a power below two it
-    /// does at once, however little, so that places are looked at ever nearer to where the relief starts.
+    /// Returns the largest radius from start to end. The flank falls from its start, and an outward relief may raise it
+    /// again. With a power below two it does so immediately, so the search also samples ever closer to the start of the
+    /// relief.
     fn outermost_radius_mm(&self, start: Position, end: Position) -> Result<f64, NotConverged> {
         let root_mm = if start.from_lobe_rad > 0.0 {
             self.at(start, self.relief.is_some_and(|relief| start.from_lobe_rad > relief.start_rad))?.radius_mm
@@ -311,15 +316,15 @@ impl ShapedFlank {
                 most_mm = most_mm.max(summit(around[0], around[2], radius_mm)?);
             }
         }
-        // What rounding alone puts outside the root is none of the relief's.
+        // Excess over the root by rounding alone is ignored.
         Ok(if most_mm > ROUNDED * root_mm { most_mm } else { root_mm })
     }
 
-    /// Where the flank starts and ends; nothing where none is left.
+    /// Finds the start and the end of the flank; none if nothing is left.
     fn space(self, bore_mm: Option<f64>) -> Result<Option<ShapedSpace>, NotConverged> {
         let lobes = self.flank.locus().lobes();
         let half_rad = half_lobe_rad(lobes);
-        // By the angle from the valley, each place exact from its nearer end.
+        // By the angle from the valley, each position exact from its nearer end.
         let place = |x: f64| {
             if x < 0.5 * half_rad { Position::from_valley(x, lobes) } else { Position::from_lobe(half_rad - x, lobes) }
         };
@@ -327,7 +332,7 @@ impl ShapedFlank {
         let relieved = |position: Position| {
             self.at(position, self.relief.is_some_and(|relief| position.from_lobe_rad > relief.start_rad))
         };
-        // Flanks that are turned towards each other start where they cross, in the middle of the space.
+        // Flanks that are rotated towards each other start at their crossing in the middle of the space.
         let mut start = Position::lobe(lobes);
         if self.turned_rad < 0.0 {
             let Some(beyond) = first(places(1), |x| Ok(relieved(place(x))?.angle_rad > 0.0))? else { return Ok(None) };
@@ -335,9 +340,10 @@ impl ShapedFlank {
             let psi = bracketed("start of a turned flank", 0.0, self.turned_rad, half_rad - beyond, angle)?;
             start = Position::from_lobe(psi, lobes);
         }
-        // What has to stay positive along the flank, by what it is ended by elsewhere. Flanks that are turned apart cross on the symmetry line of the ring's tooth; turned
-        // together each still ends where it would cross there as it was. Divided by the sine the crossing at a regular tip, which is
-        // none, is gone, as in `RingFlank::natural_limit`.
+        // Quantity that stays positive along the flank, for each possible end. Flanks that are rotated apart cross on
+        // the symmetry line of the ring's tooth. Flanks that are rotated together still end where they would cross
+        // without rotation. Division by the sine removes the trivial crossing at a regular tip, as in
+        // `RingFlank::natural_limit`.
         let is_turned_together = self.turned_rad < 0.0;
         let margin = |end: FlankEnd, position: Position| {
             let at = relieved(position)?;
@@ -352,7 +358,7 @@ impl ShapedFlank {
                 FlankEnd::RegularTip => at.speed_mm,
             })
         };
-        // A relief goes on by its power where the flank outlasts the drive's own, and may leave the ring there.
+        // If the flank outlasts the drive's own, a relief continues by its power and may leave the ring there.
         let relief_mm = self.relief.map_or(0.0, |relief| relief.amount_mm.max(0.0));
         let most_mm = self.flank.root_radius_mm() + self.path_shift_mm + self.profile_shift_mm + relief_mm;
         let is_flank =
@@ -400,7 +406,7 @@ impl ShapedFlank {
     }
 }
 
-/// The largest value of a function that rises to its summit between two places and falls from there, by golden sections.
+/// Returns the maximum of a function that rises and then falls between two arguments, by golden-section search.
 fn summit(
     mut low: f64,
     mut high: f64,
@@ -421,7 +427,7 @@ fn summit(
     Ok(most)
 }
 
-/// The first of some places at which something holds.
+/// Returns the first of some arguments at which a condition holds.
 fn first(
     places: impl Iterator<Item = f64>,
     holds: impl Fn(f64) -> Result<bool, NotConverged>,

@@ -1,47 +1,47 @@
-//! Reasons why a drive, a load or a request cannot exist.
+//! Reasons why a drive, a load or a request is impossible.
 
 use crate::contact::{Contact, Part};
 
-/// A parameter that a violation can be about.
+/// Parameter to which a violation can refer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Parameter {
-    /// `a`, mm.
+    /// `a`: semi-major axis, mm.
     SemiMajor,
-    /// `b`, mm.
+    /// `b`: semi-minor axis, mm.
     SemiMinor,
     /// Radius of an eccentric circle, mm.
     EccentricRadius,
-    /// Its distance from the axis, mm.
+    /// `e`: distance of its centre from the axis, mm.
     Eccentricity,
-    /// `U`.
+    /// `U`: number of lobes.
     Lobes,
     /// `R0` of a harmonic support function, mm.
     MeanRadius,
     /// `R` of a harmonic path, mm.
     MeanPathRadius,
-    /// `e` of either, mm.
+    /// `e`: amplitude of either, mm.
     Amplitude,
-    /// `Z_G`.
+    /// `Z_G`: theoretical number of teeth.
     ToothCount,
-    /// `Z'_G`.
+    /// `Z'_G`: number of installed teeth.
     InstalledTeeth,
-    /// `r`, mm.
+    /// `r`: tooth radius, mm.
     ToothRadius,
-    /// `L1`, mm.
+    /// `L1`: tooth width, mm.
     ToothWidth,
     /// Radius of a ball's groove, mm.
     GrooveRadius(Contact),
     /// `l`: length of a tooth's flat, mm.
     FlatLength,
-    /// `Z_K`.
+    /// `Z_K`: number of ring teeth.
     RingTeeth,
     /// Tip-circle radius, mm.
     TipRadius,
-    /// `E`, GPa.
+    /// `E`: Young's modulus, GPa.
     YoungsModulus(Part),
-    /// ν.
+    /// ν: Poisson's ratio.
     PoissonsRatio(Part),
-    /// `M0`, N·m.
+    /// `M0`: torque at the wave generator, N·m.
     InputTorque,
     /// Torque at the carrier, N·m.
     OutputTorque,
@@ -49,19 +49,19 @@ pub enum Parameter {
     Stiffness(Contact),
     /// The contact law.
     Law,
-    /// Whether the ring's teeth bend.
+    /// Bending of the ring's teeth, on or off.
     RingTeethBend,
-    /// Whether the wave generator moves on under its teeth.
+    /// Change of lever arms with wind-up, on or off.
     WaveGeneratorMoves,
-    /// Whether teeth are pressed against the corners of the ring's tips.
+    /// Contact with the corners of the ring's tips, on or off.
     CornerContact,
     /// Depth of the body at a contact, mm.
     Depth(Contact),
-    /// Compliance of what stands behind a contact, mm/N.
+    /// Series compliance of the support at a contact, mm/N.
     SeriesCompliance(Contact),
-    /// Gap along a contact's normal, µm.
+    /// Clearance along a contact's normal, µm.
     Clearance(Contact),
-    /// A number of the modification.
+    /// A value of the modification.
     Modification(Modified),
     /// The deviations.
     Deviations,
@@ -69,9 +69,9 @@ pub enum Parameter {
     DeviationList(Listed),
     /// An entry of a list of the deviations, counted from 0.
     Deviation(Listed, usize),
-    /// How far a part stands off the axis, µm.
+    /// Runout of a part: distance from the axis, µm.
     RunoutAmount(Contact),
-    /// In which direction, deg.
+    /// Direction of a part's runout, deg.
     RunoutAngle(Contact),
     /// Allowable stress of all contacts, MPa.
     AllowableStress,
@@ -79,25 +79,25 @@ pub enum Parameter {
     AllowableStressAt(Contact),
     /// `n`: speed of the wave generator, 1/min.
     InputSpeed,
-    /// A number of a point of the duty, counted from 0.
+    /// A value of a point of the duty, counted from 0.
     Duty(OfDutyPoint, usize),
-    /// Points of the duty.
+    /// Number of points of the duty.
     DutyPoints,
-    /// μ of a contact.
+    /// μ: coefficient of friction at a contact.
     FrictionCoefficient(Contact),
-    /// `μ_b`: friction of the bearing between cam and race.
+    /// `μ_b`: coefficient of friction of the bearing between cam and race.
     BearingCoefficient,
-    /// `R_b`: the radius that it belongs to, mm.
+    /// `R_b`: radius of that bearing for its friction torque, mm.
     BearingRadius,
     /// `C`: dynamic load rating of that bearing, N.
     BearingLoadRating,
     /// `w`: wear rate of a part at its contact with the teeth, mm³/(N·m).
     WearRate(Contact),
-    /// Intervals of a sweep.
+    /// Number of intervals of a sweep.
     Samples,
     /// Relative tolerance of a sweep.
     SweepTolerance,
-    /// Relative error that is asked for.
+    /// Requested relative error.
     RequestedError,
     /// Chord tolerance, mm.
     ChordTolerance,
@@ -109,13 +109,13 @@ pub enum Parameter {
     CarrierOuterRadius,
     /// Radius of the wave generator's bore, mm.
     BoreRadius,
-    /// How far a part's working surface is set back, µm.
+    /// Clearance of a part: inward offset of its working surface, µm.
     PartClearance(Part),
     /// Input angle of an assembly, deg.
     InputAngle,
 }
 
-/// What a point of a duty says.
+/// Value of a point of a duty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum OfDutyPoint {
     /// Torque at the wave generator, N·m.
@@ -128,35 +128,35 @@ pub enum OfDutyPoint {
     ShareOfTime,
 }
 
-/// What a modification says.
+/// Value of a modification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Modified {
-    /// The ring set back along its normals, µm.
+    /// Offset of the ring along its normals, µm.
     RingEquidistant,
-    /// The ring's generating path shifted, µm.
+    /// Shift of the ring's generating path, µm.
     RingPathShift,
-    /// The ring's profile shifted, µm.
+    /// Shift of the ring's profile, µm.
     RingProfileShift,
-    /// The ring turned, arcsec.
+    /// Rotation of the ring, arcsec.
     RingRotation,
-    /// The wave generator set back, µm.
+    /// Offset of the wave generator, µm.
     WaveGeneratorEquidistant,
-    /// The slots' walls set back, µm.
+    /// Offset of the slots' walls, µm.
     SlotWall,
-    /// The carrier turned, arcsec.
+    /// Rotation of the carrier, arcsec.
     CarrierRotation,
-    /// Teeth thinner in radius, µm.
+    /// Reduction of the teeth's radius, µm.
     ToothRadius,
-    /// Tip relief at the flank's end, µm.
+    /// Amount of tip relief at the flank's end, µm.
     TipReliefAmount,
-    /// Where it starts, deg.
+    /// Start of the tip relief, deg.
     TipReliefStart,
-    /// Its power.
+    /// Power of the tip relief.
     TipReliefPower,
 }
 
 impl Modified {
-    /// The part that it changes.
+    /// Returns the part that it changes.
     pub const fn part(self) -> Part {
         match self {
             Self::RingEquidistant
@@ -173,33 +173,33 @@ impl Modified {
     }
 }
 
-/// What a list of the deviations is of.
+/// List of deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Listed {
-    /// Teeth thinner in their radius, by slot, µm.
+    /// Reduction of the teeth's radius, by slot, µm.
     ToothRadius,
-    /// Slots turned away, arcsec.
+    /// Rotation of slots, arcsec.
     SlotAngle,
-    /// Slots' walls set back, µm.
+    /// Offset of the slots' walls, µm.
     SlotWall,
-    /// Ring spaces set back, µm.
+    /// Offset of ring spaces, µm.
     RingSpace,
-    /// Ring spaces turned away, arcsec.
+    /// Rotation of ring spaces, arcsec.
     RingSpaceAngle,
-    /// Lobes of the wave generator set back, µm.
+    /// Offset of the wave generator's lobes, µm.
     WaveGeneratorLobe,
 }
 
-/// The range of a parameter and its unit.
+/// Range of a parameter and its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     /// Lower end.
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Whether the ends themselves are allowed.
+    /// True if the ends themselves are allowed.
     pub closed: bool,
-    /// Unit, empty for a pure number.
+    /// Unit; empty for a pure number.
     pub unit: &'static str,
 }
 
@@ -208,7 +208,7 @@ impl Range {
         Self { low, high, closed: true, unit }
     }
 
-    /// The end that `value` is beyond, if it is; not-a-number is beyond the lower one.
+    /// Returns the end of the range that `value` exceeds, if any; the lower end for NaN.
     pub fn limit_exceeded_by(&self, value: f64) -> Option<f64> {
         let above_low = if self.closed { value >= self.low } else { value > self.low };
         let below_high = if self.closed { value <= self.high } else { value < self.high };
@@ -216,23 +216,23 @@ impl Range {
     }
 }
 
-/// Most teeth of carrier and ring.
+/// Largest number of teeth of carrier and ring.
 pub const MAX_TEETH: i64 = 10_000;
 
-/// Most lobes of a wave generator; more than any has, and so few that some number of ring teeth is possible beside any of teeth.
+/// Largest number of lobes of a wave generator. It exceeds any real design, and every tooth number has a possible ring.
 pub const MAX_LOBES: i64 = 1_000;
 
-/// Most points of a duty: more than a load spectrum has classes.
+/// Largest number of points of a duty: more than a load spectrum has classes.
 pub const MAX_DUTY_POINTS: usize = 100;
 
-/// How far the shares of a duty may be from one: what writing them with some digits leaves.
+/// Largest deviation of the shares of a duty from a sum of one, due to decimal rounding.
 pub const SHARES_TOLERANCE: f64 = 1e-6;
 
-/// Most intervals of a sweep.
+/// Largest number of intervals of a sweep.
 pub const MAX_SAMPLES: i64 = 10_000_000;
 
 impl Parameter {
-    /// The range that the parameter has to lie in.
+    /// Returns the range of the parameter.
     pub const fn range(self) -> Range {
         match self {
             Self::SemiMajor
@@ -262,9 +262,9 @@ impl Parameter {
             | Self::OutputTorque
             | Self::Duty(OfDutyPoint::InputTorque | OfDutyPoint::OutputTorque, _) => Range::closed(1e-12, 1e15, "N·m"),
             Self::Stiffness(_) => Range::closed(1e-3, 1e15, "N/mm"),
-            // As soft as the least stiffness, and nothing.
+            // As soft as the least stiffness, or zero.
             Self::SeriesCompliance(_) => Range::closed(0.0, 1e3, "mm/N"),
-            // A choice and lists, which have no number.
+            // Options and lists have no range.
             Self::Law
             | Self::RingTeethBend
             | Self::WaveGeneratorMoves
@@ -280,7 +280,7 @@ impl Parameter {
             ) => Range::closed(-1e6, 1e6, "µm"),
             Self::Modification(modified) => match modified {
                 Modified::RingRotation | Modified::CarrierRotation => Range::closed(-1e5, 1e5, "arcsec"),
-                // A single lobe has its valley at the end.
+                // A single lobe has its valley at 180 deg.
                 Modified::TipReliefStart => Range::closed(0.0, 180.0, "deg"),
                 Modified::TipReliefPower => Range::closed(0.1, 100.0, ""),
                 Modified::RingEquidistant
@@ -306,7 +306,7 @@ impl Parameter {
         }
     }
 
-    /// The violation of the parameter's range by `value`, if there is one.
+    /// Returns the violation of the parameter's range by `value`, if there is one.
     pub fn check(self, value: f64) -> Option<Violation> {
         let range = self.range();
         let limit = range.limit_exceeded_by(value)?;
@@ -314,23 +314,23 @@ impl Parameter {
     }
 }
 
-/// The possible numbers of teeth on either side of one that is impossible.
+/// Nearest possible tooth numbers on either side of an impossible one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Alternatives {
-    /// The largest below.
+    /// Largest possible number below.
     pub below: Option<i64>,
-    /// The least above.
+    /// Least possible number above.
     pub above: Option<i64>,
 }
 
 impl Alternatives {
-    /// To a number of installed teeth that does not divide `teeth`: divisors.
+    /// Returns the divisors of `teeth` next to a number of installed teeth that does not divide it.
     pub(crate) fn to_installed(installed: i64, teeth: i64) -> Self {
         let is_divisor = |other: &i64| teeth % other == 0;
         Self { below: (2..installed).rev().find(is_divisor), above: (installed + 1..=teeth).find(is_divisor) }
     }
 
-    /// To a ring that does not differ from `teeth` by the lobes, or has fewer teeth than there are lobes.
+    /// Returns the ring tooth numbers that differ from `teeth` by the lobes and are at least the number of lobes.
     pub(crate) fn to_ring_beside(teeth: i64, lobes: i64) -> Self {
         let possible = |ring: i64| {
             let is_in_range = Parameter::RingTeeth.check(ring as f64).is_none();
@@ -339,12 +339,12 @@ impl Alternatives {
         Self { below: possible(teeth - lobes), above: possible(teeth + lobes) }
     }
 
-    /// Whether the count is one of the two.
+    /// Returns true if the count is one of the two.
     pub(crate) fn contains(&self, count: i64) -> bool {
         self.below == Some(count) || self.above == Some(count)
     }
 
-    /// The nearer one, of two as near the lower. There is always one.
+    /// Returns the nearer number, the lower one if both are equally near. There is always one.
     pub fn nearest_to(&self, count: i64) -> i64 {
         let nearest = [self.below, self.above].into_iter().flatten().min_by_key(|other| (other - count).abs());
         nearest.unwrap_or(count)
@@ -360,35 +360,35 @@ impl std::fmt::Display for Alternatives {
     }
 }
 
-/// A reason why a drive, a load or a request cannot exist. Its text says what to change.
+/// Reason why a drive, a load or a request is impossible. Its text says what to change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Violation {
     /// A value outside its range.
     OutOfRange {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
         /// Its value.
         value: f64,
-        /// The end of the range that it is beyond.
+        /// End of the range that the value exceeds.
         limit: f64,
     },
-    /// `a ≤ b`.
+    /// Ellipse with `a ≤ b`.
     CamNotElongated {
         /// `a`.
         semi_major_mm: f64,
         /// `b`.
         semi_minor_mm: f64,
     },
-    /// A cam that is too small for its stroke: its lobes would have cusps, their flanks would meet, or the axis would lie outside.
+    /// The cam is too small for its stroke: its lobes have cusps, their flanks meet, or the axis is outside.
     CamTooSmall {
-        /// The radius that says how large it is.
+        /// Parameter that sets the size of the cam.
         parameter: Parameter,
         /// Its value.
         radius_mm: f64,
-        /// What it has to exceed.
+        /// Value that it has to exceed.
         least_mm: f64,
     },
-    /// `|Z_G - Z_K| ≠ U`, or `Z_K < U`.
+    /// Impossible tooth difference: `|Z_G - Z_K| ≠ U`, or `Z_K < U`.
     ToothDifference {
         /// `Z_G`.
         teeth: i64,
@@ -396,12 +396,12 @@ pub enum Violation {
         ring_teeth: i64,
         /// `U`.
         lobes: i64,
-        /// What `Z_K` could be.
+        /// Possible values of `Z_K`.
         instead: Alternatives,
     },
-    /// A groove that is no wider than the ball in it.
+    /// A groove that is no wider than its ball.
     GrooveTooTight {
-        /// At which contact.
+        /// Contact of the groove.
         contact: Contact,
         /// The groove's radius.
         groove_radius_mm: f64,
@@ -415,102 +415,102 @@ pub enum Violation {
         /// `2r`.
         tooth_diameter_mm: f64,
     },
-    /// `Z'_G` no divisor of `Z_G`.
+    /// `Z'_G` is not a divisor of `Z_G`.
     InstalledNoDivisor {
         /// `Z'_G`.
         installed: i64,
         /// `Z_G`.
         teeth: i64,
-        /// What `Z'_G` could be.
+        /// Possible values of `Z'_G`.
         instead: Alternatives,
     },
     /// Neighbouring installed teeth touch somewhere on their path.
     TeethTouch {
         /// `2r`.
         tooth_diameter_mm: f64,
-        /// Distance of two neighbouring centres, those either side of the minor axis.
+        /// Least distance of two neighbouring centres on their path, for an ellipse the pair across the minor axis.
         center_distance_mm: f64,
-        /// The radius at which teeth begin to touch: that of thinner ones, whose path lies farther in.
+        /// Radius at which teeth begin to touch. The path of thinner teeth is closer to the axis.
         touching_radius_mm: f64,
     },
-    /// The ring's tips reach in to the wave generator: no annulus is left for the carrier.
+    /// The ring's tips reach the wave generator: no annulus is left for the carrier.
     NoCarrierAnnulus {
-        /// What makes the wave generator reach so far out.
+        /// Parameter that sets the wave generator's reach.
         parameter: Parameter,
         /// Its value.
         value_mm: f64,
-        /// What it has to stay below.
+        /// Value that it has to stay below.
         limit_mm: f64,
-        /// The wave generator's largest distance from the axis, `a` of an ellipse.
+        /// Largest distance of the wave generator from the axis, `a` for an ellipse.
         cam_outer_mm: f64,
-        /// The ring's actual tip radius.
+        /// Actual tip radius of the ring.
         tip_radius_mm: f64,
     },
-    /// A clearance under `projection` that would push a tooth instead of leaving it free.
+    /// A clearance under `projection` that would load a tooth instead of unloading it.
     ClearanceNotMonotone {
-        /// At which contact.
+        /// Contact of the clearance.
         contact: Contact,
         /// The clearance.
         clearance_um: f64,
     },
-    /// What `projection` does not take.
+    /// A parameter that `projection` does not support.
     NeedsVirtualWork {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
     },
     /// A tip relief that starts at the end of the flank or beyond it.
     TipReliefBeyondFlank {
-        /// Where it starts.
+        /// Start of the tip relief.
         start_deg: f64,
-        /// Where the flank ends.
+        /// End of the flank.
         engagement_start_deg: f64,
     },
     /// A modification that leaves nothing of a part's outline.
     ModificationLeavesNothing {
-        /// Which of its numbers.
+        /// The value of the modification.
         modified: Modified,
         /// Its value.
         value: f64,
-        /// What it has to stay away from, where that is one number.
+        /// Limit of the value, if it is a single number.
         limit: Option<f64>,
     },
-    /// A list of deviations that has neither no entry nor one for each item.
+    /// A list of deviations that is neither empty nor has one entry for each item.
     DeviationCount {
-        /// Which list.
+        /// The list.
         listed: Listed,
-        /// Entries.
+        /// Number of entries.
         count: usize,
-        /// Items.
+        /// Number of items.
         items: usize,
     },
-    /// A contact law that teeth of this shape do not have.
+    /// A contact law that does not apply to teeth of this shape.
     LawOfOtherTeeth,
     /// Shares of a duty that do not add up to one.
     DutyShares {
         /// Their sum.
         sum: f64,
     },
-    /// A load rating of a bearing whose load is none that its life follows from.
+    /// A load rating of a bearing whose load does not define a life.
     NoBearingLife,
-    /// The bore takes the whole flank away.
+    /// The bore removes the whole flank.
     BoreLeavesNoFlank {
         /// The bore.
         tip_radius_mm: f64,
         /// `d_l + r`.
         root_radius_mm: f64,
     },
-    /// A part whose dimension or clearance leaves no room for it or for another.
+    /// A part whose dimension or clearance leaves no space for it or for another part.
     PartDoesNotFit {
-        /// What does not fit.
+        /// The misfit.
         misfit: Misfit,
         /// The value, given or by default, in the unit of its parameter.
         value: f64,
-        /// What it has to stay above or below.
+        /// Limit of the value, upper or lower.
         limit: f64,
     },
 }
 
-/// Why a part cannot be made, or not beside the others.
+/// Reason why a part cannot be made or does not fit to the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Misfit {
     /// The ring's outer radius does not exceed its root radius.
@@ -521,18 +521,18 @@ pub enum Misfit {
     CarrierMeetsRing,
     /// The carrier's outer radius does not exceed its inner one.
     CarrierWithoutWall,
-    /// The slots run into each other all the way to the carrier's outer radius.
+    /// The slots overlap up to the carrier's outer radius.
     SlotsTakeCarrier,
     /// The bore reaches the cam.
     BoreTakesCam,
-    /// The cam is set back by its least radius of curvature or more.
+    /// The cam's inward offset is at least its least radius of curvature.
     ClearanceTakesCam,
     /// The teeth's clearance reaches their radius.
     ClearanceTakesTooth,
 }
 
 impl Misfit {
-    /// The parameter at fault.
+    /// Returns the parameter at fault.
     pub const fn parameter(self) -> Parameter {
         match self {
             Self::RingWithoutRim => Parameter::RingOuterRadius,
@@ -545,7 +545,7 @@ impl Misfit {
     }
 }
 
-/// A number as a person would write it.
+/// Formats a number as a person would write it.
 fn readable(value: f64) -> String {
     if value == 0.0 || (1e-3..1e7).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }

@@ -1,4 +1,4 @@
-//! What a study comes to, as it goes over the wire.
+//! The answers of all kinds of study.
 
 use std::io::{self, Write};
 
@@ -12,17 +12,17 @@ use crate::sensitivity::SensitivityAnswer;
 use crate::table::Table;
 use crate::tolerance::ToleranceAnswer;
 
-/// What a study comes to, as far as it has come.
+/// Answer of a study. It is partial while the study runs.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(tag = "study", rename_all = "snake_case")]
 pub enum StudyAnswer {
-    /// Of a map.
+    /// Answer of a map.
     Map(MapAnswer),
-    /// Of a search.
+    /// Answer of a search.
     Search(Box<SearchAnswer>),
-    /// Of a sensitivity.
+    /// Answer of a sensitivity study.
     Sensitivity(SensitivityAnswer),
-    /// Of a tolerance study.
+    /// Answer of a tolerance study.
     Tolerance(ToleranceAnswer),
 }
 

@@ -1,4 +1,4 @@
-//! What the kinds of study read alike: faults of a study's document, names of quantities, whole numbers.
+//! Shared parsing of study documents: errors, names of quantities, whole numbers.
 
 use toothwave_calculation::field::{FieldCode, FieldError};
 use toothwave_calculation::json::Fault;
@@ -6,12 +6,12 @@ use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 
 use crate::quantity::Quantity;
 
-/// A fault of the study's own document.
+/// Returns an error of the study document.
 pub(crate) fn fault(pointer: &str, code: FieldCode, detail: impl Into<String>) -> NoAnswer {
     Fault { pointer: pointer.into(), code, detail: detail.into() }.into()
 }
 
-/// A value of the study's document that is beyond a limit.
+/// Returns an error of a value beyond a limit.
 pub(crate) fn beyond(pointer: &str, code: FieldCode, detail: impl Into<String>, value: f64, limit: f64) -> NoAnswer {
     let detail = detail.into();
     let error =
@@ -20,23 +20,23 @@ pub(crate) fn beyond(pointer: &str, code: FieldCode, detail: impl Into<String>, 
     NoAnswer::at_fields(NoAnswerCode::InvalidDocument, text, vec![error])
 }
 
-/// A name as a JSON pointer spells it (RFC 6901).
+/// Escapes a name for a JSON pointer (RFC 6901).
 pub(crate) fn escaped(name: &str) -> String {
     name.replace('~', "~0").replace('/', "~1")
 }
 
-/// A whole number of the study's document within a range.
+/// Checks that a value lies within a range, and converts it to a whole number.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole, and within the range")]
 pub(crate) fn whole(at: &str, value: f64, low: f64, high: f64) -> Result<u64, NoAnswer> {
     if (low..=high).contains(&value) {
         return Ok(value as u64);
     }
     let limit = if value < low { low } else { high };
-    let detail = format!("must lie between {low:?} and {high:?}, not be {value:?}");
+    let detail = format!("{value:?} is out of range. Use a value from {low:?} to {high:?}");
     Err(beyond(at, FieldCode::OutOfRange, detail, value, limit))
 }
 
-/// Which of the quantities it is, appended where it is none of them.
+/// Returns the index of a quantity, and appends it if it is new.
 pub(crate) fn index_of(quantity: &'static Quantity, quantities: &mut Vec<&'static Quantity>) -> usize {
     quantities.iter().position(|known| *known == quantity).unwrap_or_else(|| {
         quantities.push(quantity);
@@ -44,24 +44,24 @@ pub(crate) fn index_of(quantity: &'static Quantity, quantities: &mut Vec<&'stati
     })
 }
 
-/// The quantities of these names, each of which may stand there once.
+/// Returns the quantities with these names, each at most once.
 pub(crate) fn all_named(names: &[String]) -> Result<Vec<&'static Quantity>, NoAnswer> {
     let mut quantities = Vec::new();
     for (index, name) in names.iter().enumerate() {
         let at = format!("/quantities/{index}");
         let quantity = named(name, &at)?;
         if quantities.contains(&quantity) {
-            return Err(fault(&at, FieldCode::ConflictingFields, format!("`{name}` is asked for already")));
+            return Err(fault(&at, FieldCode::ConflictingFields, format!("`{name}` is listed twice. Remove one")));
         }
         quantities.push(quantity);
     }
     Ok(quantities)
 }
 
-/// The quantity of this name, which stands at this place of the study's document.
+/// Returns the quantity with this name at this place of the study document.
 pub(crate) fn named(name: &str, at: &str) -> Result<&'static Quantity, NoAnswer> {
     Quantity::named(name).ok_or_else(|| {
-        let detail = format!("no quantity is called `{name}`; `/v1/quantities` lists them");
+        let detail = format!("there is no quantity `{name}`. `/v1/quantities` lists all");
         fault(at, FieldCode::UnknownChoice, detail)
     })
 }

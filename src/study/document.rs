@@ -1,4 +1,4 @@
-//! The study document: what is asked, as it is read.
+//! The study document.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use toothwave_calculation::design::Whole;
 use toothwave_calculation::json::Tree;
 use utoipa::ToSchema;
 
-/// A question about many variants of one design.
+/// Study document: a question about many variants of one design.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(tag = "study", rename_all = "snake_case")]
 #[schema(as = Study, example = json!({
@@ -25,13 +25,13 @@ use utoipa::ToSchema;
     "quantities": ["peak_stress_ring_mpa"]
 }))]
 pub enum StudyDocument {
-    /// Quantities over one parameter or several.
+    /// Map: quantities over one or several parameters.
     Map(MapDocument),
-    /// The best designs within limits.
+    /// Search: the best designs within limits.
     Search(SearchDocument),
-    /// What each input does to each quantity.
+    /// Sensitivity: the effect of each input on each quantity.
     Sensitivity(SensitivityDocument),
-    /// What deviations do to each quantity.
+    /// Tolerance study: the effect of deviations on each quantity.
     Tolerance(ToleranceDocument),
 }
 
@@ -58,7 +58,7 @@ impl<'de> Deserialize<'de> for StudyDocument {
     }
 }
 
-/// A design document without what the study puts in. It is read as a design only then.
+/// A design document without the fields that the study sets. It is read as a design only with these fields.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Base(pub Tree);
@@ -67,7 +67,7 @@ impl utoipa::PartialSchema for Base {
     fn schema() -> utoipa::openapi::RefOr<utoipa::openapi::schema::Schema> {
         utoipa::openapi::ObjectBuilder::new()
             .schema_type(utoipa::openapi::schema::Type::Object)
-            .description(Some("A design document without what the study puts in."))
+            .description(Some("A design document. The study sets the fields that it varies."))
             .additional_properties(Some(utoipa::openapi::schema::AdditionalProperties::FreeForm(true)))
             .into()
     }
@@ -97,42 +97,42 @@ impl<'de> Deserialize<'de> for Base {
     }
 }
 
-/// Quantities over one parameter or several: a grid.
+/// Map: quantities over a grid of one or several parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct MapDocument {
     /// The design that is varied.
     pub base: Base,
-    /// The fields that vary, by JSON pointer into the design.
+    /// The varied fields, by JSON pointer into the design.
     pub over: BTreeMap<String, OverDocument>,
-    /// The quantities that are asked for, by name; all that the base has what they need for, where left out.
+    /// Names of the quantities. Default: all quantities for which the base has the required fields.
     #[serde(default)]
     pub quantities: Vec<String>,
 }
 
-/// The values of a field in a map: a range in steps, or a choice.
+/// Values of a field in a map: a range with steps, or a list.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct OverDocument {
-    /// The least value.
+    /// Smallest value.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub min: Option<f64>,
-    /// The largest value.
+    /// Largest value.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub max: Option<f64>,
-    /// So many values, equally far apart, both ends among them; of a whole number every one where left out.
+    /// Number of equidistant values, both ends included. Default for a whole number: every value.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 1, maximum = 1000000, required = false)]
     pub steps: Option<Whole>,
-    /// Instead of a range these values.
+    /// List of values, instead of a range.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub one_of: Option<Vec<ChoiceDocument>>,
 }
 
-/// A value of a choice: a word, a number, `true` or `false`.
+/// A value of a list: a word, a number, `true` or `false`.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 #[schema(as = ChoiceValue)]
@@ -181,72 +181,72 @@ impl From<&ChoiceDocument> for Tree {
     }
 }
 
-/// The best designs within limits.
+/// Search: the best designs within limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct SearchDocument {
-    /// The design without what is free.
+    /// The design without the free fields.
     pub base: Base,
-    /// The fields that are free, by JSON pointer into the design. Left out, they follow from the limits on the transmission ratio and the
-    /// outer diameter.
+    /// The free fields, by JSON pointer into the design. Default: derived from the limits on the transmission ratio and
+    /// the outer diameter.
     #[serde(default)]
     pub free: BTreeMap<String, FreeDocument>,
     /// Limits on quantities, by name.
     #[serde(default)]
     pub require: BTreeMap<String, RequireDocument>,
-    /// What is to be least or greatest: one to four quantities.
+    /// The objectives: one to four quantities that are minimised or maximised.
     pub objectives: Vec<ObjectiveDocument>,
-    /// Variants that are looked at, about.
+    /// Approximate number of evaluated variants.
     #[serde(default = "default_evaluations")]
     #[schema(value_type = i64, minimum = 100, maximum = 100000000, default = 50000, required = false)]
     pub evaluations: Whole,
-    /// What chance begins with.
+    /// Seed of the random numbers.
     #[serde(default = "default_seed")]
     #[schema(value_type = i64, minimum = 0, maximum = 9007199254740991_i64, default = 1, required = false)]
     pub seed: Whole,
-    /// Designs to begin with, each with a value for everything that is free: nothing else of it is read.
+    /// Designs that the search evaluates first. Each has a value for every free field; its other fields are ignored.
     #[serde(default)]
     pub start: Vec<Base>,
 }
 
-/// The values of a free field: a range, or a choice.
+/// Values of a free field: a range or a list.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct FreeDocument {
-    /// The least value.
+    /// Smallest value.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub min: Option<f64>,
-    /// The largest value.
+    /// Largest value.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub max: Option<f64>,
-    /// Instead of a range these values.
+    /// List of values, instead of a range.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub one_of: Option<Vec<ChoiceDocument>>,
 }
 
-/// A limit on a quantity: a range of which one end may be left out, or, of a flag, what it has to be.
+/// A limit on a quantity: a range with one or two ends or, for a flag, the required value.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 #[schema(as = Require)]
 pub enum RequireDocument {
-    /// Whether it has to be.
+    /// Required value of a flag.
     Flag(bool),
-    /// Where it has to lie.
+    /// Allowed range.
     Range(RangeDocument),
 }
 
-/// A range of which one end may be left out.
+/// A range with one or two ends.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct RangeDocument {
-    /// At least.
+    /// Smallest allowed value.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub min: Option<f64>,
-    /// At most.
+    /// Largest allowed value.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub max: Option<f64>,
@@ -274,95 +274,95 @@ impl<'de> Deserialize<'de> for RequireDocument {
     }
 }
 
-/// A quantity that is to be least or greatest.
+/// An objective: a quantity to minimise or maximise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct ObjectiveDocument {
-    /// Its name.
+    /// Name of the quantity.
     pub quantity: String,
-    /// Which of the two.
+    /// Direction.
     pub goal: Goal,
 }
 
-/// Least or greatest.
+/// Direction of an objective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Goal {
-    /// As small as can be.
+    /// Minimise.
     Min,
-    /// As great as can be.
+    /// Maximise.
     Max,
 }
 
-/// What each input does to each quantity.
+/// Sensitivity study: the effect of each input on each quantity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct SensitivityDocument {
     /// The design.
     pub base: Base,
-    /// The inputs, by JSON pointer into the design. Left out, every number of `drive`, `materials` and `load` but counts, shares of the time and
-    /// zeros, by 1 %.
+    /// The inputs, by JSON pointer into the design. Default: every nonzero number of `drive`, `materials` and `load`,
+    /// their defaults included, except counts and time shares, each by 1 %.
     #[serde(default)]
     pub inputs: BTreeMap<String, InputDocument>,
-    /// The quantities that are asked for, by name; all that the base has what they need for, where left out.
+    /// Names of the quantities. Default: all quantities for which the base has the required fields.
     #[serde(default)]
     pub quantities: Vec<String>,
 }
 
-/// How far an input is moved either way; 1 % of its value where nothing is said.
+/// Step of an input in both directions. Default: 1 % of its value.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct InputDocument {
-    /// So far, in the input's unit.
+    /// Step in the unit of the input.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0, nullable = false)]
     pub plus_minus: Option<f64>,
-    /// Instead, by this share of its value.
+    /// Step as a fraction of the value, instead of `plus_minus`.
     #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0, maximum = 1.0, nullable = false)]
     pub relative: Option<f64>,
 }
 
-/// What deviations do to each quantity.
+/// Tolerance study: the effect of deviations on each quantity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct ToleranceDocument {
     /// The design without deviations.
     pub base: Base,
-    /// Deviations of single items, by their names in the design's `deviations`: each item has one of its own. Of a runout the distribution
-    /// is that of its two components, in µm.
+    /// Deviations of single items, by their names in the design's `deviations`. Each item gets its own random value.
+    /// For a runout the distribution applies to its two components, in µm.
     #[serde(default)]
     pub deviations: BTreeMap<String, DistributionDocument>,
-    /// What deviates in a whole drive, by JSON pointer into the design: added to the base's value.
+    /// Deviations of a whole drive, by JSON pointer into the design. They are added to the base's value.
     #[serde(default)]
     pub inputs: BTreeMap<String, DistributionDocument>,
-    /// The quantities that are asked for, by name; all that the base has what they need for, where left out.
+    /// Names of the quantities. Default: all quantities for which the base has the required fields.
     #[serde(default)]
     pub quantities: Vec<String>,
-    /// Limits on quantities, by name: a drive that keeps all of them is good.
+    /// Limits on quantities, by name. A drive is good if it meets all of them.
     #[serde(default)]
     pub require: BTreeMap<String, RequireDocument>,
-    /// Drives that are drawn.
+    /// Number of random drives.
     #[serde(default = "default_samples")]
     #[schema(value_type = i64, minimum = 10, maximum = 100000000, default = 10000, required = false)]
     pub samples: Whole,
-    /// What chance begins with.
+    /// Seed of the random numbers.
     #[serde(default = "default_seed")]
     #[schema(value_type = i64, minimum = 0, maximum = 9007199254740991_i64, default = 1, required = false)]
     pub seed: Whole,
 }
 
-/// How a deviation is distributed, around zero.
+/// Distribution of a deviation, centred at zero.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct DistributionDocument {
-    /// Its kind.
+    /// Kind of distribution.
     pub distribution: DistributionKind,
-    /// Standard deviation of the whole normal distribution.
+    /// Standard deviation of the normal distribution before truncation.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0, nullable = false)]
     pub sigma: Option<f64>,
-    /// Nothing deviates further: the normal distribution is cut off here, the uniform one ends here.
+    /// Largest deviation: the normal distribution is truncated here, the uniform one ends here.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0, nullable = false)]
     pub limit: Option<f64>,
@@ -372,13 +372,13 @@ pub struct DistributionDocument {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DistributionKind {
-    /// Normal, of `sigma`, cut off at `limit` where that is given.
+    /// Normal with standard deviation `sigma`, truncated at `limit` if that is given.
     Normal,
     /// Uniform from `-limit` to `limit`.
     Uniform,
 }
 
-/// For fields that may be left out but not be null.
+/// Deserializes a field that may be absent but not null.
 fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
     T::deserialize(deserializer).map(Some)
 }

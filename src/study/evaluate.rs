@@ -1,4 +1,4 @@
-//! One variant: its document in, its quantities out, or why it has none.
+//! Evaluation of one variant: from its document to its quantities, or to the reason why it has none.
 
 use std::panic::{self, AssertUnwindSafe};
 
@@ -17,12 +17,12 @@ use utoipa::ToSchema;
 
 use crate::quantity::{Loaded, OUTER_DIAMETER_MM, Quantity, Takes, Variant};
 
-/// Why a variant has no answer.
+/// Reason for a variant without an answer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
 pub struct Reason {
-    /// The code of the field at fault, of the problem where no field is, or `panic`.
+    /// Code of the field's error, code of the problem if no field is wrong, or `panic`.
     pub code: String,
-    /// The field at fault, of a list's entries the list; empty where none is.
+    /// JSON pointer to the wrong field. For an entry of a list it is the list; without a field it is empty.
     pub pointer: String,
 }
 
@@ -33,20 +33,20 @@ pub(crate) struct Refusal {
     pub(crate) detail: String,
 }
 
-/// What a variant comes to.
+/// Outcome of a variant.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Outcome {
-    /// Its quantities, in the order in which they are asked for.
+    /// The quantities, in the requested order.
     Answered(Vec<f64>),
-    /// Why there are none.
+    /// The reason why there are none.
     Refused(Refusal),
 }
 
-/// The stop signal was seen before a variant was computed. Whoever is to compute it is as it was before.
+/// The stop flag was set before a variant was computed. The state is the same as before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stopped;
 
-/// Why a variant has no values.
+/// Reason for missing values.
 enum NoValues {
     Stopped,
     NoAnswer(NoAnswer),
@@ -61,7 +61,7 @@ impl<E: Into<NoAnswer>> From<E> for NoValues {
     }
 }
 
-/// What is asked of every variant.
+/// The quantities of a study, with the computations that they need.
 #[derive(Debug, Clone)]
 pub(crate) struct Evaluator {
     pub(crate) quantities: Vec<&'static Quantity>,
@@ -85,7 +85,7 @@ impl Evaluator {
         }
     }
 
-    /// What becomes of a document; a panic is an outcome too.
+    /// Returns the outcome of a document. A panic is an outcome too.
     pub(crate) fn outcome(&self, document: &Tree, stop: &dyn Stop) -> Result<Outcome, Stopped> {
         caught(|| match self.answer(document, stop) {
             Ok(values) => Ok(Outcome::Answered(values)),
@@ -128,7 +128,7 @@ impl Evaluator {
         Ok(Loaded { checked, peaks: (&sweep).into(), losses, radial_forces })
     }
 
-    /// As drawn (docs/theory.md section 8). A ring that is none has no outer diameter.
+    /// Outer radius of the ring as it is drawn (docs/explanation/theory.md section 8). An impossible ring has no outer diameter.
     fn ring_outer_radius_mm(&self, design: &Design, drive: &Drive) -> Result<f64, NoAnswer> {
         let parts = design.parts_parameters()?;
         let root_radius_mm = drive.root_radius_mm() + 1e-3 * parts.ring_clearance_um;
@@ -169,7 +169,7 @@ impl From<NoAnswer> for Refusal {
     }
 }
 
-/// A field without the number of its entry: of a drive with thousands of teeth each would be a reason of its own.
+/// Removes the index of a list entry. Otherwise each of thousands of teeth would be a separate reason.
 fn without_entry(pointer: &str) -> &str {
     match pointer.rsplit_once('/') {
         Some((list, entry)) if entry.parse::<u64>().is_ok() => list,
@@ -177,11 +177,11 @@ fn without_entry(pointer: &str) -> &str {
     }
 }
 
-/// A fault at one variant is no reason to leave the others without an answer.
+/// Catches a panic, so that the other variants still get answers.
 fn caught(job: impl FnOnce() -> Result<Outcome, Stopped>) -> Result<Outcome, Stopped> {
     panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
-        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a text");
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no text");
         let reason = Reason { code: "panic".into(), pointer: String::new() };
         Ok(Outcome::Refused(Refusal { reason, detail: text.into() }))
     })
@@ -192,7 +192,7 @@ mod tests {
     use super::{Outcome, caught};
 
     #[test]
-    fn a_panic_at_one_variant_is_its_reason() {
+    fn panic_of_variant_is_its_reason() {
         let outcome = caught(|| panic!("on purpose"));
         assert!(
             matches!(outcome, Ok(Outcome::Refused(refusal)) if refusal.reason.code == "panic" && refusal.detail == "on purpose")

@@ -1,33 +1,34 @@
-//! A bounded front: of the points that no other beats, those that together keep the most hypervolume.
+//! A bounded Pareto front: of the non-dominated points it keeps those with the most hypervolume together.
 //!
-//! Of more points than it holds the one goes whose absence costs the least hypervolume, as in SMS-EMOA (N. Beume, B. Naujoks, M. Emmerich,
-//! European Journal of Operational Research 181, 2007, 1653-1669). One point for each objective, its best, always stays. So more points never
-//! make a front worse: the best value of each objective stays, and as long as the same points hold these, the hypervolume does not fall.
+//! If the front is full, the point with the least hypervolume contribution is removed, as in SMS-EMOA (N. Beume, B.
+//! Naujoks, M. Emmerich, European Journal of Operational Research 181, 2007, 1653-1669). The best point of each
+//! objective always stays. So further points never worsen the best value of an objective. While these best points stay
+//! the same, the hypervolume does not fall.
 
 use crate::optimise::Point;
 
-/// Objectives at most.
+/// Most objectives.
 pub(crate) const MOST_OBJECTIVES: usize = 4;
 
-/// How far the corner lies beyond the worst value of each objective, over the range of the values.
+/// Distance of the reference point from the worst value of each objective, as a fraction of the range of values.
 const MARGIN: f64 = 0.1;
 
-/// Objectives; those that there are not are 0, and 1 of the corner.
+/// Objective values. Unused objectives are 0, and 1 in the reference point.
 type Place = [f64; MOST_OBJECTIVES];
 
-/// Points that do not beat each other.
+/// Points that do not dominate each other.
 #[derive(Debug, Clone)]
 pub(crate) struct Front {
     most: usize,
     points: Vec<Point>,
     places: Vec<Place>,
-    /// The hypervolume that each point has to itself; empty until one is needed.
+    /// Hypervolume contribution of each point. Empty until one is needed.
     volumes: Vec<f64>,
     corner: Place,
 }
 
 impl Front {
-    /// An empty one that holds so many points.
+    /// Makes an empty front for at most this many points.
     pub(crate) const fn new(most: usize) -> Self {
         Self { most, points: Vec::new(), places: Vec::new(), volumes: Vec::new(), corner: [1.0; MOST_OBJECTIVES] }
     }
@@ -36,12 +37,12 @@ impl Front {
         &self.points
     }
 
-    /// Takes all points away.
+    /// Removes and returns all points.
     pub(crate) fn take(&mut self) -> Vec<Point> {
         std::mem::replace(self, Self::new(self.most)).points
     }
 
-    /// The points by their objectives.
+    /// Returns the points in the order of their objectives.
     pub(crate) fn into_sorted(mut self) -> Vec<Point> {
         self.points.sort_by(|one, other| {
             let pairs = one.judged.objectives.iter().zip(&other.judged.objectives);
@@ -53,7 +54,7 @@ impl Front {
         self.points
     }
 
-    /// Adds a point, if none is as good, and takes away those that it beats.
+    /// Adds a point if no other covers it, and removes the points that it covers.
     pub(crate) fn insert(&mut self, point: Point) {
         let mut place = [0.0; MOST_OBJECTIVES];
         for (at, value) in place.iter_mut().zip(&point.judged.objectives) {
@@ -93,7 +94,7 @@ impl Front {
         }
     }
 
-    /// Moves the corner where it is too near to the points or too far from them; whether it has moved.
+    /// Moves the reference point if it is too near to the points or too far from them. Returns true if it moved.
     fn fit_corner(&mut self) -> bool {
         let mut has_moved = false;
         for (objective, corner) in self.corner.iter_mut().enumerate() {
@@ -108,7 +109,7 @@ impl Front {
         has_moved
     }
 
-    /// The point whose absence costs least, the best of each objective apart.
+    /// Returns the point with the least contribution, apart from the best of each objective.
     fn least(&self) -> usize {
         let best = |objective: usize| {
             let by = |index: &usize| {
@@ -123,13 +124,13 @@ impl Front {
         };
         let ends: [Option<usize>; MOST_OBJECTIVES] = std::array::from_fn(best);
         let inner = (0..self.places.len()).filter(|&index| !ends.contains(&Some(index)));
-        // Of equal ones the later.
+        // The later one of equal contributions.
         let least =
             inner.min_by(|&one, &other| self.volumes[one].total_cmp(&self.volumes[other]).then(other.cmp(&one)));
         least.unwrap_or(self.places.len() - 1)
     }
 
-    /// Measures the points anew that share hypervolume with a place and with no other point.
+    /// Updates the contributions of the points that share hypervolume with this place and with no other point.
     fn measure_beside(&mut self, place: &Place) {
         for index in 0..self.places.len() {
             let shared = worse(&self.places[index], place);
@@ -140,7 +141,7 @@ impl Front {
         }
     }
 
-    /// The hypervolume that a point has to itself.
+    /// Computes the hypervolume contribution of a point.
     fn volume(&self, index: usize) -> f64 {
         let own = &self.places[index];
         let mut shared: Vec<Place> = Vec::new();
@@ -156,17 +157,18 @@ impl Front {
     }
 }
 
-/// Whether one is nowhere worse than the other.
+/// True if no objective of `one` is worse.
 fn covers(one: &Place, other: &Place) -> bool {
     one.iter().zip(other).all(|(one, other)| one <= other)
 }
 
-/// What both beat.
+/// Returns the worst of both in each objective. Its region is dominated by both points.
 fn worse(one: &Place, other: &Place) -> Place {
     std::array::from_fn(|objective| one[objective].max(other[objective]))
 }
 
-/// The hypervolume between points and a corner in the first so many objectives, slice by slice of the last of them.
+/// Computes the hypervolume between points and the reference point in the first `objectives` objectives, by slices of
+/// the last one.
 fn hypervolume(points: &mut [Place], corner: &Place, objectives: usize) -> f64 {
     let mut sum = 0.0;
     if objectives == 2 {
@@ -200,7 +202,7 @@ mod tests {
         Point { place: Vec::new(), judged: Judged { objectives, violations: Vec::new() }, values: Vec::new() }
     }
 
-    /// On a sphere no point beats another; whole numbers before bring equal ones.
+    /// Points on a sphere do not dominate each other. Whole numbers in front give equal values.
     fn points(count: usize, objectives: usize, seed: u64) -> Vec<Point> {
         let mut stream = Stream::new(seed, 0);
         let mut one = || {
@@ -220,7 +222,7 @@ mod tests {
         std::array::from_fn(least)
     }
 
-    /// Counted in cells of a lattice.
+    /// The expected value is counted in cells of a grid.
     #[test]
     fn hypervolume_is_count_of_cells() {
         const SIDE: u32 = 8;
@@ -263,13 +265,13 @@ mod tests {
             }
             let anew: Vec<_> = (0..30).map(|index| front.volume(index)).collect();
             let differs = anew.iter().zip(&front.volumes).any(|(anew, kept)| (anew - kept).abs() > 1e-12);
-            assert!(!differs, "{objectives}: volumes that were kept differ from those measured anew");
+            assert!(!differs, "{objectives}: updated contributions differ from new ones");
         }
     }
 
-    /// All tie in the third objective: as its ends they filled the archive.
+    /// All points are equal in the third objective. Only one of them is kept for it.
     #[test]
-    fn one_end_stays_for_each_objective() {
+    fn best_point_of_each_objective_stays() {
         let tied = |point: Point| Point {
             judged: Judged { objectives: [point.judged.objectives, vec![-14.0]].concat(), ..point.judged },
             ..point
@@ -285,16 +287,16 @@ mod tests {
         assert!(whole.points().len() > 1000 && share > 0.995 * all, "{share} of {all}");
     }
 
-    /// As many as the islands of the largest search bring: it took hours.
+    /// The islands of the largest search give this many points, so the merge must not be quadratic.
     #[test]
-    fn a_front_of_hundreds_of_thousands_is_merged() {
+    fn merges_hundreds_of_thousands_of_points() {
         let front = merged(points(200_000, 2, 5));
         assert!(front.len() > 100 && front.len() <= 200, "{}", front.len());
         let objective =
             |front: &[Point], at: usize| front.iter().map(|point| point.judged.objectives[at]).fold(0.0, f64::min);
         let all = points(200_000, 2, 5);
         for at in 0..2 {
-            assert_eq!(objective(&front, at).to_bits(), objective(&all, at).to_bits(), "the ends stay");
+            assert_eq!(objective(&front, at).to_bits(), objective(&all, at).to_bits(), "the best values stay");
         }
     }
 }

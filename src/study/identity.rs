@@ -1,4 +1,4 @@
-//! What tells a study from every other one.
+//! Identity of a study.
 
 use toothwave_calculation::design::Design;
 use toothwave_calculation::json::{self, Tree};
@@ -10,21 +10,25 @@ use crate::document::StudyDocument;
 use crate::quantity::Quantity;
 use crate::variant::{Domain, Template, Variable};
 
-/// The hash of what is asked, within limits that some variants may be beyond: equal however the fields are ordered and the numbers spelled, and whether defaults
-/// are written out.
+/// Computes the id: a hash of the question and of the limits. Order of fields, spelling of numbers and explicit
+/// defaults do not change it. `inputs` are those of a sensitivity, each with its step.
 pub(crate) fn id(
     document: &StudyDocument,
     template: &Template,
     quantities: &[&'static Quantity],
+    inputs: Option<Tree>,
     limits: &question::Limits,
 ) -> Result<Key, NoAnswer> {
     let mut asked = tree_of(document)?;
-    let base = asked.remove(&["base".into()]).unwrap_or(Tree::Null);
+    let base = complete(&asked.remove(&["base".into()]).unwrap_or(Tree::Null))?;
+    if let Some(inputs) = inputs {
+        asked.set(&["inputs".into()], inputs);
+    }
     let names = [String::from("quantities")];
     if asked.at(&names).is_some() {
         asked.set(&names, Tree::Array(quantities.iter().map(|quantity| Tree::Text(quantity.name.into())).collect()));
     }
-    // The base is known by the designs at both ends of all ranges, and by what it has itself of what varies.
+    // The base is hashed as the designs at both ends of all ranges, plus its own values of the varied fields.
     let end = |is_low: bool| {
         move |variable: &Variable| match variable.domain {
             Domain::Real { min, max } | Domain::Whole { min, max } => Some(if is_low { min } else { max }),
@@ -42,8 +46,8 @@ pub(crate) fn id(
     Ok(Key::new("study", &parts.join(" ").as_str(), &within.as_str()))
 }
 
-/// A design with all its defaults; as it is where it is none.
-fn complete(design: &Tree) -> Result<Tree, NoAnswer> {
+/// Returns a design with all defaults, or the document itself if it is not a design.
+pub(crate) fn complete(design: &Tree) -> Result<Tree, NoAnswer> {
     match design.read::<Design>() {
         Ok(read) => tree_of(&read.normalised().with_defaults()),
         Err(_) => Ok(design.clone()),

@@ -1,8 +1,8 @@
-//! Many variants of one design: maps, searches, sensitivities and tolerances.
+//! Studies of many variants of one design: maps, searches, sensitivity and tolerance studies.
 //!
-//! A study is read from a document, checked as a whole, and consists of chunks. A chunk is a pure function of the study and of its number;
-//! what chunks come to is merged in any order to the same bits. Who carries them out, on how many threads, and what is kept where, is the
-//! caller's: this crate knows no network, no clock and no threads.
+//! A study is read from a document and checked as a whole. It consists of chunks; each is a pure function of the study
+//! and the chunk's number. Parts can be merged in any order and give the same bits. This crate has no network, no clock
+//! and no threads: the caller runs and stores the chunks.
 
 mod answer;
 mod ask;

@@ -11,29 +11,29 @@ use crate::ask::{beyond, escaped, fault, index_of, named};
 use crate::document::{RangeDocument, RequireDocument};
 use crate::quantity::Quantity;
 
-/// A limit on a quantity: one end of a range, or what a flag has to be.
+/// A limit on a quantity: one end of a range, or the required value of a flag.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Limit {
-    /// Which of the quantities asked for.
+    /// Index into the quantities of the study.
     pub(crate) quantity: usize,
     pub(crate) bound: Bound,
     pub(crate) limit: f64,
 }
 
-/// On which side of a limit a quantity has to be.
+/// Side of a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Bound {
-    /// At or above it.
+    /// At least the limit.
     Min,
-    /// At or below it.
+    /// At most the limit.
     Max,
-    /// Of a flag: 1 where it has to be true, 0 where it has not.
+    /// Required value of a flag: 1 for true, 0 for false.
     Is,
 }
 
 impl Limit {
-    /// How far a value is beyond the limit, as a share of it; 0 where it is not.
+    /// Returns the excess of a value as a fraction of the limit; 0 within the limit.
     pub(crate) fn violation(&self, value: f64) -> f64 {
         let beyond = match self.bound {
             Bound::Min => self.limit - value,
@@ -44,7 +44,7 @@ impl Limit {
         beyond.max(0.0) / scale
     }
 
-    /// Whether a value keeps the limit, but hardly.
+    /// True if a value is within 1 % of the limit.
     pub(crate) fn binds(&self, value: f64) -> bool {
         const HARDLY: f64 = 0.01;
         let scale = if self.limit == 0.0 { 1.0 } else { self.limit.abs() };
@@ -52,7 +52,7 @@ impl Limit {
     }
 }
 
-/// The limits of a study; quantities that are not asked for yet are appended to those that are.
+/// Returns the limits of a study, and appends their quantities to `quantities`.
 pub(crate) fn limits(
     require: &BTreeMap<String, RequireDocument>,
     quantities: &mut Vec<&'static Quantity>,
@@ -67,28 +67,28 @@ pub(crate) fn limits(
                 limits.push(Limit { quantity: index, bound: Bound::Is, limit: f64::from(u8::from(*flag)) });
             }
             (RequireDocument::Flag(_), false) => {
-                let detail = format!("`{name}` is a number: give it a `min` or a `max`");
+                let detail = format!("`{name}` is a number. Use an object with `min` or `max`");
                 return Err(fault(&at, FieldCode::WrongType, detail));
             }
             (RequireDocument::Range(_), true) => {
-                let detail = format!("`{name}` is `true` or `false`, and has no range");
+                let detail = format!("`{name}` is a flag and has no range. Use `true` or `false`");
                 return Err(fault(&at, FieldCode::WrongType, detail));
             }
             (RequireDocument::Range(RangeDocument { min: None, max: None }), false) => {
-                return Err(fault(&at, FieldCode::MissingField, "a `min` or a `max` is required here"));
+                return Err(fault(&at, FieldCode::MissingField, "the range has no ends. Add `min` or `max`"));
             }
             (RequireDocument::Range(RangeDocument { min: Some(min), max: Some(max) }), false) if min > max => {
-                let detail = format!("the range is empty: {min:?} is above {max:?}");
+                let detail = format!("the range is empty: `min` {min:?} is above `max` {max:?}. Use a smaller `min`");
                 return Err(beyond(&format!("{at}/min"), FieldCode::OutOfRange, detail, *min, *max));
             }
             (RequireDocument::Range(RangeDocument { min: Some(min), .. }), false) if *min > quantity.most => {
                 let most = quantity.most;
-                let detail = format!("no drive has a `{name}` of {min:?} or more: it is {most:?} at most");
+                let detail = format!("no drive has a `{name}` of {min:?} or more. Use at most {most:?}");
                 return Err(beyond(&format!("{at}/min"), FieldCode::OutOfRange, detail, *min, most));
             }
             (RequireDocument::Range(RangeDocument { max: Some(max), .. }), false) if *max < quantity.least => {
                 let least = quantity.least;
-                let detail = format!("allow values above zero: no drive has a `{name}` of {max:?} or less");
+                let detail = format!("no drive has a `{name}` of {max:?} or less. Use a value above zero");
                 return Err(beyond(&format!("{at}/max"), FieldCode::OutOfRange, detail, *max, least));
             }
             (RequireDocument::Range(RangeDocument { min, max }), false) => {

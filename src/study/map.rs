@@ -1,4 +1,4 @@
-//! A map: quantities over a grid.
+//! Map: quantities over a grid.
 
 use std::sync::Arc;
 
@@ -15,30 +15,30 @@ use crate::rows::{ImpossibleAnswer, PossibleAnswer, ReasonAnswer, Rows, RowsPart
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, Template, Value, Variable};
 
-/// The grid of a map: the last axis is the fastest.
+/// The grid of a map. The last axis varies fastest.
 #[derive(Debug, Clone)]
 pub(crate) struct Map {
     variables: Arc<Vec<Variable>>,
-    /// One for each of these.
+    /// One axis for each variable.
     axes: Vec<Axis>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Axis {
     values: Values,
-    /// Whether all its values are numbers.
+    /// True if all values are numbers.
     is_number: bool,
 }
 
-/// The values of an axis, each made when it is wanted: there may be a million on every one of hundreds of axes before anybody has counted
-/// their combinations.
+/// The values of an axis, computed on demand. A document may name hundreds of axes with a million values each before
+/// their combinations are counted.
 #[derive(Debug, Clone, Copy)]
 enum Values {
-    /// A choice of so many.
+    /// This many words of a list.
     Choices(u32),
-    /// So many whole numbers, each so much above the one before.
+    /// This many whole numbers from `min`, each `by` above the one before.
     Whole { min: f64, by: f64, count: u32 },
-    /// So many values, equally far apart, both ends among them.
+    /// This many equidistant values, both ends included.
     Steps { min: f64, max: f64, steps: u32 },
 }
 
@@ -55,7 +55,7 @@ impl Values {
             Self::Whole { min, by, .. } => Value::Number(min + by * f64::from(index)),
             Self::Steps { min, max, steps } => {
                 let share = f64::from(index) / (f64::from(steps) - 1.0).max(1.0);
-                // Both ends are met exactly.
+                // Both ends are exact.
                 Value::Number(if index + 1 == steps && index > 0 { max } else { min + share * (max - min) })
             }
         }
@@ -66,7 +66,7 @@ impl Values {
     }
 }
 
-/// What `min` and `max` or `one_of` say.
+/// Reads `min` and `max`, or `one_of`.
 pub(crate) fn asked(
     at: &str,
     min: Option<f64>,
@@ -77,16 +77,16 @@ pub(crate) fn asked(
         (None, None, Some(choices)) => Ok(Asked::OneOf(choices.iter().map(Tree::from).collect())),
         (Some(min), Some(max), None) => Ok(Asked::Range { min, max }),
         (_, _, Some(_)) => {
-            Err(fault(at, FieldCode::ConflictingFields, "a range or `one_of` may stand here, and not both"))
+            Err(fault(at, FieldCode::ConflictingFields, "both a range and `one_of` are given. Remove one"))
         }
-        _ => Err(fault(at, FieldCode::MissingField, "`min` and `max` are required here, or `one_of`")),
+        _ => Err(fault(at, FieldCode::MissingField, "the values are missing. Add `min` and `max`, or `one_of`")),
     }
 }
 
 impl Map {
     pub(crate) fn new(document: &MapDocument) -> Result<(Self, Template), NoAnswer> {
         if document.over.is_empty() {
-            return Err(fault("/over", FieldCode::MissingField, "a map runs over at least one field"));
+            return Err(fault("/over", FieldCode::MissingField, "`over` is empty. Name at least one field"));
         }
         let mut free = Vec::new();
         for (pointer, OverDocument { min, max, one_of, .. }) in &document.over {
@@ -99,7 +99,7 @@ impl Map {
         Ok((Self { variables: template.shared_variables(), axes }, template))
     }
 
-    /// About what it takes in memory beside its template.
+    /// Estimated memory without its template, in bytes.
     pub(crate) const fn bytes(&self) -> usize {
         self.axes.len() * size_of::<Axis>()
     }
@@ -108,7 +108,7 @@ impl Map {
         self.variables.iter().zip(&self.axes)
     }
 
-    /// Variants of the grid; none where there are more than can be counted.
+    /// Number of variants of the grid, or none if it exceeds 64 bits.
     pub(crate) fn variants(&self) -> Option<u64> {
         self.axes.iter().try_fold(1_u64, |product, axis| product.checked_mul(u64::from(axis.values.count())))
     }
@@ -120,7 +120,7 @@ impl Map {
             .rev()
             .map(|axis| {
                 let count = u64::from(axis.values.count());
-                // Below the number of the axis' values.
+                // The remainder is below the number of values, a `u32`.
                 let value = axis.values.at(u32::try_from(variant % count).unwrap_or_default());
                 variant /= count;
                 value
@@ -138,42 +138,43 @@ impl Axis {
         let steps = over.steps.map(|steps| steps.value());
         if let Some(steps) = steps.filter(|steps| !(1.0..=MOST_STEPS).contains(steps)) {
             let limit = if steps < 1.0 { 1.0 } else { MOST_STEPS };
-            let detail = format!("`steps` must lie between 1 and {MOST_STEPS:?}, not be {steps:?}");
+            let detail = format!("`steps` is {steps:?}. Use a value from 1 to {MOST_STEPS:?}");
             return Err(beyond(&format!("{at}/steps"), FieldCode::OutOfRange, detail, steps, limit));
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the bounds above")]
         let count = |steps: f64| steps as u32;
         let values = match (&variable.domain, steps) {
             (Domain::OneOf(_), Some(_)) => {
-                let detail = "`steps` are of a range, and `one_of` names the values";
+                let detail = "both `steps` and `one_of` are given. Remove `steps`";
                 return Err(fault(&at, FieldCode::ConflictingFields, detail));
             }
-            // As many as one document names.
+            // The document limits the number of choices.
             (Domain::OneOf(count), None) => Values::Choices(u32::try_from(*count).unwrap_or(u32::MAX)),
             (Domain::Real { .. }, None) => {
                 return Err(fault(
                     &at,
                     FieldCode::MissingField,
-                    "`steps` is required here: a range has numbers without end",
+                    "`steps` is missing. Add the number of values in the range",
                 ));
             }
             (Domain::Whole { min, max }, None) => {
                 let all = max - min + 1.0;
                 if all > MOST_STEPS {
-                    let detail = format!("the range has {all:?} whole numbers, more than {MOST_STEPS:?}");
+                    let detail = format!("the range has {all:?} whole numbers. Use at most {MOST_STEPS:?}");
                     return Err(beyond(&at, FieldCode::OutOfRange, detail, all, MOST_STEPS));
                 }
                 Values::Whole { min: *min, by: 1.0, count: count(all) }
             }
             (Domain::Real { min, max } | Domain::Whole { min, max }, Some(steps)) if min >= max && steps > 1.0 => {
-                let detail = format!("the range holds one value, {min:?}, and not {steps:?}");
+                let detail = format!("the range has one value, {min:?}, but `steps` is {steps:?}. Use 1");
                 return Err(beyond(&format!("{at}/steps"), FieldCode::OutOfRange, detail, steps, 1.0));
             }
             (Domain::Whole { min, max }, Some(steps)) => {
-                // Of whole numbers below 2^53 a quotient that is whole is exact.
+                // A whole quotient of whole numbers below 2^53 is exact.
                 let by = (max - min) / (steps - 1.0).max(1.0);
                 if by.fract() != 0.0 {
-                    let detail = format!("a whole number is wanted here, and these steps are of {by:?}");
+                    let detail =
+                        format!("the field needs whole numbers, but these steps are {by:?} apart. Change `steps`");
                     return Err(fault(&format!("{at}/steps"), FieldCode::WrongType, detail));
                 }
                 Values::Whole { min: *min, by, count: count(steps) }
@@ -206,7 +207,7 @@ impl Axis {
     }
 }
 
-/// A value as a word.
+/// Returns a value as text.
 fn spelled(tree: &Tree) -> String {
     match tree {
         Tree::Text(text) => text.clone(),
@@ -220,40 +221,40 @@ impl Rows for Map {
     }
 }
 
-/// Quantities over a grid. The variants are numbered from 0, the last of `over` being the fastest.
+/// Map: quantities over a grid. Variants are numbered from 0; the last field of `over` varies fastest.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct MapAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
-    /// The build that computed it: equal builds on equal processors give equal bytes.
+    /// Build of the program. Equal builds on equal processors give equal bytes.
     pub build: &'static str,
-    /// Whether every variant was looked at.
+    /// True if every variant is computed.
     pub is_complete: bool,
-    /// Variants of the grid.
+    /// Number of variants of the grid.
     pub variants: u64,
     /// The axes of the grid.
     pub over: Vec<AxisAnswer>,
-    /// The variants that have an answer.
+    /// Variants with an answer.
     pub possible: PossibleAnswer,
-    /// Those that have none.
+    /// Variants without an answer.
     pub impossible: ImpossibleAnswer,
-    /// Why they have none.
+    /// Reasons for missing answers.
     pub reasons: Vec<ReasonAnswer>,
     #[serde(skip)]
     #[schema(ignore)]
     quantities: Vec<&'static str>,
 }
 
-/// An axis of a grid: `values`, or `choices` where they are no numbers.
+/// An axis of a grid: `values`, or `choices` if they are not numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AxisAnswer {
     /// JSON pointer into the design.
     pub pointer: String,
-    /// The numbers that it takes.
+    /// Values, if they are numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub values: Option<Vec<f64>>,
-    /// The words that it takes.
+    /// Values, if they are words.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub choices: Option<Vec<String>>,
@@ -278,7 +279,7 @@ impl MapAnswer {
         }
     }
 
-    /// A row a variant: its number, its place on each axis, its quantities or the code of its reason.
+    /// Returns a table with one row for each variant: number, values of the axes, quantities or the reason's code.
     pub(crate) fn table(&self) -> Table<'_> {
         let axis = |axis: &AxisAnswer| {
             let kind = if axis.values.is_some() { Content::Number } else { Content::Word };
@@ -313,7 +314,7 @@ impl MapAnswer {
         places
     }
 
-    /// About how many bytes its columns take.
+    /// Estimated bytes of the columns.
     pub(crate) fn held_bytes(&self) -> u64 {
         let of_possible = 8 * (self.quantities.len() + 1) * self.possible.variant.len();
         (of_possible + 12 * self.impossible.variant.len()) as u64

@@ -1,100 +1,102 @@
-//! An optimiser that knows nothing of drives: points of a unit cube in, what they come to back, a front of those that none beats.
+//! A general optimiser: it proposes points of a unit cube, receives their objectives, and returns the Pareto front.
 //!
-//! A scan with a low-discrepancy sequence (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018) comes first, then
-//! steps of two kinds in turns that chance decides: differential evolution (R. Storn, K. Price, Journal of Global Optimization 11, 1997,
-//! 341-359), and simulated binary crossover with polynomial mutation (K. Deb, R. B. Agrawal, Complex Systems 9, 1995, 115-148; K. Deb,
-//! M. Goyal, Computer Science and Informatics 26, 1996, 30-45). Compared is with limits as by K. Deb (IEEE Transactions on Evolutionary
-//! Computation 6, 2002, 182-197): a point within all limits beats one beyond, and of two beyond the one that is less so. What nobody beats is
-//! kept in an archive, from which most steps begin. Either kind alone finds less in as many steps (docs/studies.md).
+//! It starts with a scan of a low-discrepancy sequence (M. Roberts, "The unreasonable effectiveness of quasirandom
+//! sequences", 2018). Then it takes random steps of two kinds. One is differential evolution (R. Storn, K. Price,
+//! Journal of Global Optimization 11, 1997, 341-359). The other is simulated binary crossover with polynomial mutation
+//! (K. Deb, R. B. Agrawal, Complex Systems 9, 1995, 115-148; K. Deb, M. Goyal, Computer Science and Informatics 26,
+//! 1996, 30-45). Limits are handled as by K. Deb (IEEE Transactions on Evolutionary Computation 6, 2002, 182-197): a
+//! feasible point beats an infeasible one, and the smaller violation beats the larger one. An archive keeps the
+//! non-dominated points, and most steps start there. Each kind of step alone finds less in as many steps
+//! (benches/results/searches.md).
 //!
-//! If half of the evaluations found nothing within all limits, each limit gets a population of its own: there a point that exceeds the other
-//! limits less is better, and of two that exceed them equally the one that exceeds this limit less.
+//! If half of the evaluations found no feasible point, each limit gets its own population. There the smaller violation
+//! of the other limits is better, then the smaller violation of this limit.
 
 use serde::{Deserialize, Serialize};
 
 use crate::front::Front;
 use crate::random::Stream;
 
-/// Points that evolve.
+/// Size of a population.
 const POPULATION: usize = 48;
 
-/// Points of the archive at most.
+/// Largest size of the archive.
 pub(crate) const MOST_OF_FRONT: usize = 100;
 
-/// Of the steps, the share that begins in the archive, where it has points.
+/// Fraction of the steps that start in the archive, if it has points.
 const FROM_ARCHIVE: f64 = 0.9;
 
-/// Of the steps for a limit that is relaxed, the share that begins at its best point.
+/// Fraction of the steps for a relaxed limit that start at its best point.
 const FROM_BEST: f64 = 0.5;
 
-/// Points of a limit that is relaxed that are judged anew, at least: as many as steps need.
+/// Fewest points of a relaxed limit that are evaluated again: as many as the steps need.
 const LEAST_JUDGED_ANEW: usize = 8;
 
-/// Distribution indices of crossover and mutation: the larger, the nearer children stay to their parents. Twice those of
-/// K. Deb's NSGA-II: parents from the archive are near to the front already.
+/// Distribution indices of crossover and mutation. A larger index keeps children nearer to their parents. They are
+/// twice those of K. Deb's NSGA-II, because parents from the archive are already near the front.
 const CROSSOVER_INDEX: f64 = 30.0;
 const MUTATION_INDEX: f64 = 40.0;
 
-/// What a point comes to.
+/// Evaluation of a point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judged {
-    /// What is to be least.
+    /// Objectives, all to be minimised.
     pub objectives: Vec<f64>,
-    /// How far each limit is exceeded, as a share of it; 0 where it is kept.
+    /// Violation of each limit as a fraction of it; 0 if the limit is met.
     pub violations: Vec<f64>,
 }
 
-/// A point with what it comes to.
+/// A point with its evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// Where in the unit cube.
+    /// Position in the unit cube.
     pub place: Vec<f64>,
-    /// What it comes to.
+    /// Evaluation.
     pub judged: Judged,
-    /// Whatever else is known of it.
+    /// Further values of the caller.
     pub values: Vec<f64>,
 }
 
 impl Point {
-    /// About what it takes in memory beside itself.
+    /// Estimated heap memory in bytes.
     pub(crate) fn bytes(&self) -> usize {
         let Judged { violations, objectives } = &self.judged;
         [&self.place, violations, objectives, &self.values].iter().map(|of| size_of_val(of.as_slice())).sum()
     }
 }
 
-/// How long each stage is.
+/// Lengths of the stages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
     /// Dimensions of the cube.
     pub dimensions: usize,
-    /// Limits.
+    /// Number of limits.
     pub limits: usize,
-    /// Where the scan begins in its sequence.
+    /// Index of the scan's first point in its sequence.
     pub scan_from: u64,
-    /// Points of the scan.
+    /// Number of points of the scan.
     pub scan: u64,
-    /// Points altogether.
+    /// Number of all points.
     pub evaluations: u64,
 }
 
-/// The optimiser: asked for a point, told what it comes to.
+/// The optimiser. `ask` proposes a point, and `tell` receives its evaluation.
 #[derive(Debug, Clone)]
 pub struct Optimiser {
     plan: Plan,
     stream: Stream,
     shift: Vec<f64>,
-    /// Points that come first, each with the population that it begins in.
+    /// First points, each with its population.
     given: Vec<(usize, Vec<f64>)>,
     asked: u64,
     scanned: u64,
-    /// The one that keeps all limits, then, once they are needed, one for each limit that is relaxed.
+    /// The population for all limits. Later also one for each relaxed limit.
     populations: Vec<Vec<Point>>,
     archive: Front,
-    /// Of each limit, the point that exceeds it least and keeps all others.
+    /// For each limit, the point that meets all other limits and violates this one least.
     relaxations: Vec<Option<Point>>,
     nearest: Option<Point>,
-    /// The population that the point asked for last is for, and the member whose place it may take.
+    /// The population of the last proposed point, and the member that it may replace.
     population: usize,
     parent: Option<usize>,
 }
@@ -104,19 +106,19 @@ impl Judged {
         self.violations.iter().all(|&violation| violation <= 0.0)
     }
 
-    /// How far the limits are exceeded together, the relaxed one apart, and how far that one is.
+    /// Returns the sum of the violations without the relaxed limit, and the violation of the relaxed limit.
     fn beyond(&self, relaxed: Option<usize>) -> (f64, f64) {
         let own = relaxed.map_or(0.0, |limit| self.violations[limit]);
         let others = self.violations.iter().enumerate().filter(|&(limit, _)| Some(limit) != relaxed);
         (others.map(|(_, violation)| violation).sum(), own)
     }
 
-    /// Whether it is nowhere worse, and somewhere better or the same everywhere.
+    /// True if no objective is worse.
     fn covers(&self, other: &Self) -> bool {
         self.objectives.iter().zip(&other.objectives).all(|(one, other)| one <= other)
     }
 
-    /// Whether it takes the place of another one.
+    /// True if it may replace the other one.
     fn is_no_worse(&self, other: &Self, relaxed: Option<usize>) -> bool {
         let (own, others) = (self.beyond(relaxed), other.beyond(relaxed));
         if own > (0.0, 0.0) || others > (0.0, 0.0) { own <= others } else { !other.covers(self) || self.covers(other) }
@@ -124,7 +126,7 @@ impl Judged {
 }
 
 impl Optimiser {
-    /// A run of its own, from a seed; points that are given come first.
+    /// Starts a run with a seed. The given points come first.
     pub fn new(plan: Plan, given: Vec<Vec<f64>>, seed: u64, stream: u64) -> Self {
         let mut shifts = Stream::new(seed, u64::MAX);
         Self {
@@ -143,22 +145,23 @@ impl Optimiser {
         }
     }
 
-    /// Whether the points asked for next are those of the scan, which nothing has led to.
+    /// True while the next points belong to the scan and do not depend on evaluations.
     pub fn is_scanning(&self) -> bool {
         self.given.is_empty() && self.scanned < self.plan.scan
     }
 
-    /// Whether all points were asked for.
+    /// True if all points were proposed.
     pub const fn is_over(&self) -> bool {
         self.asked >= self.plan.evaluations
     }
 
-    /// The limit that a population relaxes.
+    /// Returns the limit that a population relaxes.
     const fn relaxed(population: usize) -> Option<usize> {
         population.checked_sub(1)
     }
 
-    /// The population whose turn it is: that which keeps all limits, or, where nothing good was found for long, those of the limits in turns.
+    /// Returns the population of the next step. If half of the evaluations found no feasible point, the populations of
+    /// the limits take turns.
     fn next_population(&mut self) -> usize {
         let is_late = 2 * self.asked > self.plan.evaluations;
         if self.plan.limits == 0 || !is_late || !self.archive.points().is_empty() {
@@ -170,7 +173,7 @@ impl Optimiser {
         1 + usize::try_from(self.asked % self.plan.limits as u64).unwrap_or_default()
     }
 
-    /// The next point.
+    /// Proposes the next point.
     pub fn ask(&mut self) -> Vec<f64> {
         self.asked += 1;
         self.parent = None;
@@ -190,16 +193,16 @@ impl Optimiser {
         self.offspring()
     }
 
-    /// Those of the population whose turn it is.
+    /// Returns the current population.
     fn members(&self) -> &[Point] {
         &self.populations[self.population]
     }
 
-    /// A point of the sequence: multiples of the powers of 1/φ, `φ^(d+1) = φ + 1`, shifted, modulo 1.
+    /// Returns a point of the sequence: multiples of the powers of 1/φ with `φ^(d+1) = φ + 1`, shifted, modulo 1.
     fn scan_point(&self, index: u64) -> Vec<f64> {
         let dimensions = i32::try_from(self.plan.dimensions).unwrap_or(i32::MAX);
         let mut phi = 1.5_f64;
-        // A contraction: after these steps nothing changes.
+        // The iteration is a contraction and has converged after these steps.
         for _ in 0..64 {
             phi = (1.0 + phi).powf(1.0 / f64::from(dimensions.saturating_add(1)));
         }
@@ -210,11 +213,11 @@ impl Optimiser {
     fn offspring(&mut self) -> Vec<f64> {
         let target = self.stream.below(self.members().len());
         self.parent = Some(target);
-        // For one limit there are few steps, and those of the population are the more varied ones.
+        // A limit's own population gets few steps, and differential evolution varies more.
         if self.population == 0 && self.stream.share() < 0.5 { self.crossed() } else { self.differed(target) }
     }
 
-    /// Where a step begins: mostly at the best that are known.
+    /// Returns the start of a step: mostly one of the best known points.
     fn begin(&mut self) -> Vec<f64> {
         let archive = self.archive.points();
         if !archive.is_empty() && self.stream.share() < FROM_ARCHIVE {
@@ -232,7 +235,7 @@ impl Optimiser {
         }
     }
 
-    /// Between and around two points, here and there a little off.
+    /// Crossover of two points with mutation.
     fn crossed(&mut self) -> Vec<f64> {
         let (mut child, other) = (self.begin(), self.begin());
         for (own, other) in child.iter_mut().zip(other) {
@@ -248,7 +251,7 @@ impl Optimiser {
         child
     }
 
-    /// From a point along the difference of two others, as far as it is taken over into a member of the population.
+    /// Differential evolution: a point plus a scaled difference of two others, crossed with a member of the population.
     fn differed(&mut self, target: usize) -> Vec<f64> {
         let count = self.members().len();
         let base = self.begin();
@@ -264,7 +267,7 @@ impl Optimiser {
         for axis in 0..self.plan.dimensions {
             if axis == forced || self.stream.share() < crossing {
                 let moved = base[axis] + scale * (one[axis] - other[axis]);
-                // Beyond an end of the cube, somewhere between that end and where the step began.
+                // Beyond a face of the cube: a random point between that face and the start.
                 child[axis] = if moved < 0.0 {
                     base[axis] * self.stream.share()
                 } else if moved > 1.0 {
@@ -274,14 +277,14 @@ impl Optimiser {
                 };
             }
         }
-        // Choices of few values hold a difference still: now and then an axis is drawn anew.
+        // A choice with few values can make all differences zero, so sometimes an axis is random.
         if self.stream.share() < 0.1 {
             child[forced] = self.stream.share();
         }
         child
     }
 
-    /// What the point asked for last comes to; nothing where it is impossible.
+    /// Receives the evaluation of the last proposed point, or none if it is impossible.
     pub fn tell(&mut self, point: Option<Point>) {
         let Some(point) = point else { return };
         if point.judged.is_good() {
@@ -309,7 +312,7 @@ impl Optimiser {
                 }
             }
             None if members.len() < POPULATION => members.push(point),
-            // Of the scan the best begin: each takes the place of the worst.
+            // Only the best points of the scan stay: each replaces the worst.
             None => {
                 let worst = members.iter_mut().max_by(|one, other| order(beyond(one), beyond(other)));
                 if let Some(worst) = worst.filter(|worst| beyond(&point) < beyond(worst)) {
@@ -319,7 +322,7 @@ impl Optimiser {
         }
     }
 
-    /// Begins again from the best points, to be judged anew, with so many more after them.
+    /// Restarts from the best points, which are evaluated again, with `more` points after them.
     pub fn judge_anew(&mut self, more: u64) {
         let mut populations = std::mem::replace(&mut self.populations, vec![Vec::new()]);
         if self.archive.points().is_empty() && populations.len() > 1 {
@@ -339,17 +342,17 @@ impl Optimiser {
         self.plan.evaluations = self.asked + self.given.len() as u64 + more;
     }
 
-    /// The points that nobody beats.
+    /// Returns the non-dominated points.
     pub fn front(&self) -> &[Point] {
         self.archive.points()
     }
 
-    /// Of each limit, the point that exceeds it least and keeps all others.
+    /// Returns, for each limit, the point that meets all others and violates this one least.
     pub fn relaxations(&self) -> &[Option<Point>] {
         &self.relaxations
     }
 
-    /// The point that exceeds limits least.
+    /// Returns the point with the smallest violation.
     pub const fn nearest(&self) -> Option<&Point> {
         self.nearest.as_ref()
     }
@@ -359,20 +362,20 @@ fn order(one: (f64, f64), other: (f64, f64)) -> std::cmp::Ordering {
     one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1))
 }
 
-/// How far apart two children of a crossing lie, over the distance of their parents, at a share of the probability.
+/// Returns the distance of two children over the distance of their parents, at this quantile.
 fn spread(share: f64) -> f64 {
     let times = if share <= 0.5 { 2.0 * share } else { 0.5 / (1.0 - share) };
     times.powf(1.0 / (CROSSOVER_INDEX + 1.0))
 }
 
-/// By how much of its range a mutation moves a coordinate, at a share of the probability.
+/// Returns the shift of a coordinate by mutation as a fraction of its range, at this quantile.
 fn offset(share: f64) -> f64 {
     let off = |share: f64| 1.0 - (2.0 * share).powf(1.0 / (MUTATION_INDEX + 1.0));
     if share < 0.5 { -off(share) } else { off(1.0 - share) }
 }
 
-/// The front of several. Whoever merges gives them by their numbers, since it depends on their order: so that the front of more islands is that
-/// of fewer with points added.
+/// Merges several fronts. The result depends on their order. In the order of the islands, more islands give the same
+/// front as fewer islands with more points.
 pub fn merged(fronts: impl IntoIterator<Item = Point>) -> Vec<Point> {
     let mut front = Front::new(2 * MOST_OF_FRONT);
     for point in fronts {
@@ -385,9 +388,9 @@ pub fn merged(fronts: impl IntoIterator<Item = Point>) -> Vec<Point> {
 mod tests {
     use super::{CROSSOVER_INDEX, Judged, MUTATION_INDEX, Optimiser, Plan, Point, offset, spread};
 
-    /// By Deb and Agrawal the density of the spread is `(η + 1) β^η / 2` below 1 and `(η + 1) / (2 β^(η + 2))` above.
+    /// Density of the spread by Deb and Agrawal: `(η + 1) β^η / 2` below 1, and `(η + 1) / (2 β^(η + 2))` above.
     #[test]
-    fn children_are_as_often_nearer_to_each_other_than_their_parents_as_farther() {
+    fn crossover_follows_published_distribution() {
         assert!((spread(0.5) - 1.0).abs() < 1e-15);
         for share in [0.01, 0.1, 0.3, 0.45] {
             let (nearer, farther) = (spread(share), spread(1.0 - share));
@@ -399,9 +402,9 @@ mod tests {
         }
     }
 
-    /// By Deb and Goyal the density of the offset is `(η + 1) (1 - |δ|)^η / 2`.
+    /// Density of the offset by Deb and Goyal: `(η + 1) (1 - |δ|)^η / 2`.
     #[test]
-    fn mutations_go_either_way_alike_and_as_far_as_their_range() {
+    fn mutation_follows_published_distribution() {
         assert!((offset(0.0) + 1.0).abs() < 1e-15 && offset(0.5).abs() < 1e-15);
         for share in [0.01, 0.1, 0.3, 0.45] {
             assert!((offset(share) + offset(1.0 - share)).abs() < 1e-12);
@@ -409,9 +412,9 @@ mod tests {
         }
     }
 
-    /// Of points that lie on one face of the cube and are alike elsewhere, children lie there too, but for mutations.
+    /// If all points lie on one face of the cube, children lie there too, except for mutations.
     #[test]
-    fn a_child_stays_where_both_of_its_parents_are_and_within_the_cube() {
+    fn children_stay_on_face_of_parents() {
         const TRIES: u32 = 4000;
         let plan = Plan { dimensions: 4, limits: 0, scan_from: 0, scan: 0, evaluations: u64::MAX };
         let mut optimiser = Optimiser::new(plan, Vec::new(), 9, 0);
@@ -427,7 +430,7 @@ mod tests {
             moved += u32::from(!is_at(2, 0.5));
             crossed += u32::from(!is_at(3, 0.2) && !is_at(3, 0.7));
         }
-        // A quarter is mutated; of half that is crossed half is of unlike parents.
+        // A quarter is mutated. Half is crossed, and half of that has unequal parents.
         assert!(moved.abs_diff(TRIES / 4) < 120, "{moved}");
         assert!(crossed.abs_diff(TRIES * 7 / 16) < 130, "{crossed}");
     }

@@ -1,4 +1,4 @@
-//! What can be asked of a variant: each quantity once, with its unit, its meaning and where it comes from.
+//! The quantities of a variant, each with unit, meaning and source.
 
 use serde::Serialize;
 use toothwave_calculation::sweep::CheckedSweep;
@@ -11,26 +11,26 @@ use toothwave_solver::sweep::{ContactPeaks, SweepPeaks};
 use toothwave_solver::{Contact, Drive};
 use utoipa::ToSchema;
 
-/// Where a quantity comes from.
+/// Source of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
-    /// An answer to the same document holds it.
+    /// An answer to the same document has it.
     Answer(AnswerPlace),
-    /// It follows from an answer.
+    /// Definition of a quantity that is computed from an answer.
     Definition(&'static str),
 }
 
-/// A place in an answer.
+/// Place of a value in an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 pub struct AnswerPlace {
-    /// The path that is asked.
+    /// Path of the request.
     pub path: &'static str,
-    /// A JSON pointer into the answer.
+    /// JSON pointer into the answer.
     pub pointer: &'static str,
 }
 
-/// What has to be known of a variant.
+/// Fields of the document that a quantity needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Needs {
@@ -42,54 +42,54 @@ pub enum Needs {
     AllowableStress,
     /// A load and `friction`.
     Friction,
-    /// A load, `friction` and a speed: `load.input_speed_rpm`, or those of a `load.duty`.
+    /// A load, `friction` and a speed: `load.input_speed_rpm`, or the speeds of a `load.duty`.
     FrictionAndSpeed,
 }
 
-/// What a quantity is worked out from.
+/// Computation that a quantity needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Takes {
-    /// The drive.
+    /// Geometry of the drive.
     Drive,
-    /// The peaks of a sweep.
+    /// Peaks of a sweep.
     Peaks,
-    /// What the teeth push the wave generator aside with, state by state.
+    /// Radial forces on the wave generator, state by state.
     RadialForces,
-    /// What friction takes, state by state.
+    /// Losses by friction, state by state.
     Losses,
 }
 
-/// What works a quantity out.
+/// Function that computes a quantity.
 type Of = fn(&Variant<'_>) -> Result<f64, NotConverged>;
 
-/// A quantity.
+/// A quantity of a study.
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
 pub struct Quantity {
-    /// Its name, which ends in its unit.
+    /// Name, which ends in the unit.
     pub name: &'static str,
-    /// Its unit, empty of a pure number.
+    /// Unit, empty for a pure number.
     pub unit: &'static str,
-    /// What it means.
+    /// Meaning.
     pub meaning: &'static str,
-    /// Whether it is only true or false; as a number 1 or 0.
+    /// True if the quantity is a flag: 1 for true, 0 for false.
     pub is_flag: bool,
-    /// What the document has to hold for it.
+    /// Fields that the document needs for it.
     pub needs: Needs,
-    /// Where it comes from.
+    /// Source.
     pub source: Source,
-    /// The places of a design that it may depend on: what stands elsewhere does not change it.
+    /// Paths of a design that it may depend on. Other fields do not change it.
     #[serde(skip)]
     #[schema(ignore)]
     pub(crate) depends_on: &'static [&'static str],
-    /// A place of a design that says it alone, where anything stands there.
+    /// Path of a design that sets it directly, if the field is given.
     #[serde(skip)]
     #[schema(ignore)]
     pub(crate) said_by: Option<&'static str>,
-    /// What it is at least, whatever the drive.
+    /// Lower bound for every drive.
     #[serde(skip)]
     #[schema(ignore)]
     pub(crate) least: f64,
-    /// What it is at most, whatever the drive.
+    /// Upper bound for every drive.
     #[serde(skip)]
     #[schema(ignore)]
     pub(crate) most: f64,
@@ -107,27 +107,27 @@ impl PartialEq for Quantity {
     }
 }
 
-/// What is known of a variant, as far as its quantities need it.
+/// Results of a variant, as far as its quantities need them.
 #[derive(Debug)]
 pub(crate) struct Variant<'a> {
     pub(crate) drive: &'a Drive,
-    /// As drawn.
+    /// Outer radius of the ring as drawn.
     pub(crate) ring_outer_radius_mm: f64,
     pub(crate) loaded: Option<Loaded<'a>>,
 }
 
-/// A variant under its load.
+/// Results under load.
 #[derive(Debug)]
 pub(crate) struct Loaded<'a> {
     pub(crate) checked: &'a CheckedSweep,
     pub(crate) peaks: SweepPeaks,
-    /// Over all points of a duty; the rest is of its hardest.
+    /// Losses over all points of a duty. The other results are those of its hardest point.
     pub(crate) losses: Option<LossTotalsAnswer>,
     pub(crate) radial_forces: Option<RadialForces>,
 }
 
 impl Variant<'_> {
-    /// A number of the loaded variant; those who ask have seen to it that it is there.
+    /// Returns a value under load. `Evaluator` has computed it if a quantity needs it.
     fn loaded(&self, of: impl Fn(&Loaded<'_>) -> f64) -> f64 {
         self.loaded.as_ref().map_or(f64::NAN, of)
     }
@@ -160,14 +160,14 @@ fn most(column: &[f64]) -> f64 {
     column.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Where a design says the numbers of teeth and lobes.
+/// Paths of the numbers of teeth and lobes.
 const COUNTS: [&str; 4] =
     ["/drive/wave_generator/kind", "/drive/wave_generator/lobes", "/drive/teeth/count", "/drive/ring/teeth"];
 
-/// Where it says what carries which load.
+/// Paths that set the load and its torques.
 const TORQUE: [&str; 5] = ["/load", COUNTS[0], COUNTS[1], COUNTS[2], COUNTS[3]];
 
-/// All but how things are drawn.
+/// All paths except those of drawings.
 const MECHANICS: [&str; 9] =
     ["/drive", "/materials", "/load", "/model", "/modification", "/deviations", "/friction", "/parts", "/sweep"];
 
@@ -229,16 +229,16 @@ const fn sweep(pointer: &'static str) -> Source {
     Source::Answer(AnswerPlace { path: "/v1/sweep", pointer })
 }
 
-/// Whoever knows no more than these two knows how large the parts may be, and how many teeth they have.
+/// The two quantities from which a search can derive the free fields.
 pub(crate) const TRANSMISSION_RATIO: &str = "transmission_ratio";
 pub(crate) const OUTER_DIAMETER_MM: &str = "outer_diameter_mm";
 
-/// All quantities, in the order in which they are listed.
+/// All quantities, in the order of the list.
 pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         TRANSMISSION_RATIO,
         "",
-        "Input speed over carrier speed, ring fixed; below zero where they turn against each other.",
+        "Input speed over carrier speed, ring fixed. Negative if they turn in opposite directions.",
         geometry("/transmission_ratio"),
         |variant| Ok(variant.drive.transmission_ratio()),
     )
@@ -254,9 +254,9 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         OUTER_DIAMETER_MM,
         "mm",
-        "Diameter of the whole drive.",
+        "Outer diameter of the drive.",
         Source::Definition(
-            "twice the ring's outer radius: `parts.ring.outer_radius_mm`, or where that is left out 1.2 times the root radius with `parts.ring.clearance_um`, the ring's `modification` apart",
+            "twice the ring's outer radius: `parts.ring.outer_radius_mm`, by default 1.2 times the root radius with `parts.ring.clearance_um`, without the ring's `modification`",
         ),
         |variant| Ok(2.0 * variant.ring_outer_radius_mm),
     )
@@ -277,14 +277,14 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         "ring_tooth_height_mm",
         "mm",
-        "Root radius less tip radius.",
+        "Root radius minus tip radius.",
         geometry("/ring/tooth_height_mm"),
         |variant| Ok(variant.drive.root_radius_mm() - variant.drive.tip_radius_mm()),
     ),
     of_drive(
         "tooth_width_mm",
         "mm",
-        "Extent of a tooth along the axis.",
+        "Length of a tooth along the axis.",
         Source::Definition("`drive.teeth.width_mm`; a ball's diameter"),
         |variant| Ok(variant.drive.tooth_width_mm()),
     )
@@ -292,7 +292,7 @@ pub static QUANTITIES: [Quantity; 60] = [
     .depending_on(&["/drive/teeth"]),
     flag(
         "undercut",
-        "Whether the ring's tips are cut away by their own envelope.",
+        "True if the envelope of the teeth undercuts the ring's tips.",
         geometry("/undercut/occurs"),
         |variant| Ok(f64::from(u8::from(variant.drive.flank().is_undercut()))),
     ),
@@ -307,7 +307,7 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         "teeth_in_mesh_min",
         "",
-        "The fewest teeth that mesh at any input angle: of a zone where the zones are alike, elsewhere of all of them together.",
+        "Smallest number of teeth in mesh over all input angles: in one zone if the zones are equal, otherwise in all zones together.",
         mesh("/teeth_in_mesh_per_zone/min"),
         #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
         |variant| Ok(Mesh::new(variant.drive).teeth_in_mesh().min as f64),
@@ -316,14 +316,14 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         "engagement_start_deg",
         "deg",
-        "Where a tooth starts to touch the ring's flank, from the middle of a lobe.",
+        "Angle from the middle of a lobe at which a tooth begins to touch the ring's flank.",
         mesh("/engagement/start_deg"),
         |variant| Ok(variant.drive.flank_limit().position.from_lobe_deg()),
     ),
     of_drive(
         "period_deg",
         "deg",
-        "The input angle after which the load pattern repeats.",
+        "Input angle after which the load pattern repeats.",
         mesh("/period_deg"),
         |variant| Ok(Mesh::new(variant.drive).period_deg()),
     )
@@ -331,7 +331,7 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         "ring_pressure_angle_max_deg",
         "deg",
-        "Largest angle between the ring's normal and the radius on the engaged flank.",
+        "Largest pressure angle of the ring on the engaged flank.",
         geometry("/ring/pressure_angle_max_deg"),
         |variant| {
             let steepest = variant.drive.steepest_engaged()?;
@@ -341,35 +341,35 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         "wave_generator_pressure_angle_max_deg",
         "deg",
-        "Largest angle between the cam's normal and the radius at an engaged tooth.",
+        "Largest pressure angle of the wave generator at an engaged tooth.",
         geometry("/wave_generator/pressure_angle_max_deg"),
         |variant| Ok(variant.drive.steepest_engaged()?.tan_pressure_angle.atan().to_degrees()),
     ),
     of_drive(
         "slot_wall_mm",
         "mm",
-        "The wall between two slots where it is thinnest; not positive where they run into each other.",
+        "Smallest wall thickness between two slots. Zero or negative if the slots overlap.",
         geometry("/carrier/slot_wall_mm"),
         |variant| Ok(variant.drive.slot_wall_mm()),
     ),
     of_drive(
         "slot_wall_over_slot_width",
         "",
-        "The same over the width of a slot: below a quarter a finding warns.",
+        "Smallest wall thickness between two slots over the slot width. Below 0.25 a finding warns.",
         Source::Definition("`slot_wall_mm` over the width of a slot without clearance"),
         |variant| Ok(variant.drive.slot_wall_mm() / (2.0 * variant.drive.slot_half_width_mm())),
     ),
     of_drive(
         "carrier_radial_space_mm",
         "mm",
-        "What wave generator and ring leave the carrier.",
+        "Radial space for the carrier between wave generator and ring.",
         geometry("/carrier/radial_space_mm"),
         |variant| Ok(variant.drive.tip_radius_mm() - variant.drive.cam_outer_radius_mm()),
     ),
     of_drive(
         "tooth_center_clearance_inner_mm",
         "mm",
-        "How far the centre of an engaged tooth stays outside the carrier's inner limit at least.",
+        "Smallest distance of an engaged tooth's centre from the inner limit of the carrier.",
         geometry("/carrier/tooth_center_clearance_inner_mm"),
         |variant| {
             let drive = variant.drive;
@@ -380,7 +380,7 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         "tooth_center_clearance_outer_mm",
         "mm",
-        "How far the centre of an engaged tooth stays inside the carrier's outer limit at least.",
+        "Smallest distance of an engaged tooth's centre from the outer limit of the carrier.",
         geometry("/carrier/tooth_center_clearance_outer_mm"),
         |variant| {
             let drive = variant.drive;
@@ -390,7 +390,7 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_drive(
         "tooth_gap_min_mm",
         "mm",
-        "The least gap between neighbouring teeth anywhere on their path.",
+        "Smallest gap between neighbouring teeth on their path.",
         geometry("/teeth/gap_min_mm"),
         |variant| {
             let drive = variant.drive;
@@ -403,7 +403,7 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_sweep(
         "output_torque_nm",
         "N·m",
-        "Torque at the carrier, ring fixed, losses neglected.",
+        "Torque at the carrier, ring fixed, without losses.",
         sweep("/load/output_torque_nm"),
         |variant| Ok(variant.loaded(|loaded| loaded.checked.load().output_torque_nm(variant.drive))),
     )
@@ -459,7 +459,7 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_sweep(
         "peak_stress_mpa",
         "MPa",
-        "Largest contact stress of all.",
+        "Largest contact stress.",
         Source::Definition("the largest of the three contacts' peak stresses"),
         |variant| Ok(variant.greatest(|peaks| peaks.stress_mpa.value)),
     )
@@ -467,7 +467,7 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_sweep(
         "peak_force_n",
         "N",
-        "Largest contact force of all.",
+        "Largest contact force.",
         Source::Definition("the largest of the three contacts' peak forces"),
         |variant| Ok(variant.greatest(|peaks| peaks.force_n.value)),
     )
@@ -499,7 +499,7 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_sweep(
         "loaded_teeth_min",
         "",
-        "The fewest teeth that carry load at any input angle: of a zone where the zones are alike, elsewhere of all of them together.",
+        "Smallest number of loaded teeth over all input angles: in one zone if the zones are equal, otherwise in all zones together.",
         sweep("/loaded_teeth_per_zone/min"),
         #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
         |variant| Ok(variant.loaded(|loaded| loaded.peaks.loaded_teeth.min as f64)),
@@ -508,164 +508,164 @@ pub static QUANTITIES: [Quantity; 60] = [
     of_sweep(
         "wind_up_min_deg",
         "deg",
-        "The least wind-up of the input under the load.",
-        Source::Definition("the least of `/wind_up/wind_up_deg` of the sweep"),
+        "Smallest wind-up of the input under load.",
+        Source::Definition("the smallest of `/wind_up/wind_up_deg` of the sweep"),
         |variant| Ok(variant.loaded(|loaded| loaded.peaks.wind_up_deg.least)),
     ),
     of_sweep(
         "wind_up_max_deg",
         "deg",
-        "The largest wind-up of the input under the load.",
+        "Largest wind-up of the input under load.",
         Source::Definition("the largest of `/wind_up/wind_up_deg` of the sweep"),
         |variant| Ok(variant.loaded(|loaded| loaded.peaks.wind_up_deg.largest)),
     ),
     of_sweep(
         "torsional_stiffness_min_nm_per_rad",
         "N·m/rad",
-        "The least torsional stiffness at the output over the period.",
-        Source::Definition("the least of `/wind_up/torsional_stiffness_nm_per_rad` of the sweep"),
+        "Smallest torsional stiffness at the output over the period.",
+        Source::Definition("the smallest of `/wind_up/torsional_stiffness_nm_per_rad` of the sweep"),
         |variant| Ok(variant.loaded(|loaded| loaded.peaks.torsional_stiffness_nm_per_rad.least)),
     ),
     of_sweep(
         "torsional_stiffness_max_nm_per_rad",
         "N·m/rad",
-        "The largest torsional stiffness at the output over the period.",
+        "Largest torsional stiffness at the output over the period.",
         Source::Definition("the largest of `/wind_up/torsional_stiffness_nm_per_rad` of the sweep"),
         |variant| Ok(variant.loaded(|loaded| loaded.peaks.torsional_stiffness_nm_per_rad.largest)),
     ),
     of_sweep(
         "transmission_error_peak_to_peak_deg",
         "deg",
-        "Range of the wind-up over the period, at the output.",
+        "Peak-to-peak range of the wind-up over the period, at the output.",
         sweep("/wind_up/transmission_error_peak_to_peak_deg"),
         |variant| Ok(variant.loaded(|loaded| loaded.peaks.transmission_error_peak_to_peak_deg(variant.drive))),
     ),
     of_sweep(
         "radial_force_max_n",
         "N",
-        "What the teeth push the wave generator aside with at most; 0 where lobes balance each other.",
-        Source::Definition("the largest of `/radial_force_n/value` of the sweep, 0 where it is left out"),
+        "Largest radial force of the teeth on the wave generator. 0 if the lobes balance each other.",
+        Source::Definition("the largest of `/radial_force_n/value` of the sweep, 0 if it is absent"),
         |variant| Ok(variant.loaded(|loaded| loaded.radial_forces.as_ref().map_or(0.0, |forces| most(&forces.force_n)))),
     )
     .taking(Takes::RadialForces),
     of_sweep(
         "carrier_finger_share",
         "",
-        "What a finger of the carrier gives way over what a tooth does at its contacts; 0 where no estimate tells. Above a fifth a finding speaks of it.",
-        Source::Definition("the `share` of the finger as it is held among `/series_compliance_estimates` of the sweep, 0 where it is left out"),
+        "Deflection of a carrier finger over the deflection of a tooth at its contacts. 0 without an estimate. Above 0.2 there is a finding.",
+        Source::Definition("the `share` of the finger with its actual support among `/series_compliance_estimates` of the sweep, 0 if it is absent"),
         |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.peaks.contacts).unwrap_or(0.0))),
     )
     .not_below_zero(),
     of_capacity(
         "torque_capacity_input_nm",
-        "The largest torque at the wave generator under which no contact exceeds the allowable stress.",
+        "Largest torque at the wave generator with which no contact exceeds the allowable stress.",
         sweep("/torque_capacity/input_torque_nm"),
         |variant| Ok(variant.capacity(|input_nm, _| input_nm)),
     ),
     of_capacity(
         "torque_capacity_output_nm",
-        "The same at the carrier.",
+        "Largest torque at the carrier with which no contact exceeds the allowable stress.",
         sweep("/torque_capacity/output_torque_nm"),
         |variant| Ok(variant.capacity(|_, output_nm| output_nm)),
     ),
     loss_ratio(
         "loss_ratio",
-        "Mean power lost over the input torque times the speed of wave generator against carrier.",
+        "Mean power loss over the input torque times the speed of the wave generator relative to the carrier.",
         sweep("/losses/loss_ratio"),
         |variant| Ok(variant.losses(|losses| losses.loss_ratio)),
     ),
     loss_ratio(
         "loss_ratio_wave_generator",
-        "The part of it that is lost between teeth and wave generator.",
+        "Part of the loss ratio between teeth and wave generator.",
         sweep("/losses/loss_ratio_by_place/wave_generator"),
         |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.wave_generator)),
     ),
     loss_ratio(
         "loss_ratio_ring",
-        "The part of it that is lost between teeth and ring.",
+        "Part of the loss ratio between teeth and ring.",
         sweep("/losses/loss_ratio_by_place/ring"),
         |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.ring)),
     ),
     loss_ratio(
         "loss_ratio_carrier",
-        "The part of it that is lost between teeth and carrier.",
+        "Part of the loss ratio between teeth and carrier.",
         sweep("/losses/loss_ratio_by_place/carrier"),
         |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.carrier)),
     ),
     loss_ratio(
         "loss_ratio_bearing",
-        "The part of it that is lost in the bearing.",
+        "Part of the loss ratio in the bearing.",
         sweep("/losses/loss_ratio_by_place/bearing"),
         |variant| Ok(variant.losses(|losses| losses.loss_ratio_by_place.bearing)),
     ),
     efficiency(
         "efficiency_ring_fixed",
-        "Efficiency where the wave generator drives the carrier.",
+        "Efficiency if the wave generator drives the carrier.",
         sweep("/losses/efficiency/ring_fixed"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed)),
     ),
     efficiency(
         "efficiency_carrier_fixed",
-        "Efficiency where the wave generator drives the ring.",
+        "Efficiency if the wave generator drives the ring.",
         sweep("/losses/efficiency/carrier_fixed"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.carrier_fixed)),
     ),
     efficiency(
         "efficiency_wave_generator_fixed",
-        "Efficiency where the ring drives the carrier.",
+        "Efficiency if the ring drives the carrier.",
         sweep("/losses/efficiency/wave_generator_fixed"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.wave_generator_fixed)),
     ),
     efficiency(
         "efficiency_ring_fixed_back_driven",
-        "Efficiency where the carrier drives the wave generator; at or below 0 the drive locks itself.",
+        "Efficiency if the carrier drives the wave generator. At or below 0 the drive is self-locking.",
         sweep("/losses/efficiency/ring_fixed_back_driven"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed_back_driven)),
     ),
     efficiency(
         "efficiency_carrier_fixed_back_driven",
-        "Efficiency where the ring drives the wave generator.",
+        "Efficiency if the ring drives the wave generator.",
         sweep("/losses/efficiency/carrier_fixed_back_driven"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.carrier_fixed_back_driven)),
     ),
     efficiency(
         "efficiency_wave_generator_fixed_back_driven",
-        "Efficiency where the carrier drives the ring.",
+        "Efficiency if the carrier drives the ring.",
         sweep("/losses/efficiency/wave_generator_fixed_back_driven"),
         |variant| Ok(variant.losses(|losses| losses.efficiency.wave_generator_fixed_back_driven)),
     ),
     of_losses(
         "efficiency_error",
         "",
-        "The largest error of the efficiency that was measured at such losses.",
+        "Largest error of the efficiency that was measured at such losses.",
         sweep("/losses/efficiency_error"),
         |variant| Ok(variant.losses(|losses| losses.efficiency_error)),
     ),
     of_losses(
         "required_input_torque_nm",
         "N·m",
-        "The torque that the wave generator really needs, ring fixed.",
+        "Torque that the wave generator needs with losses, ring fixed.",
         sweep("/losses/required_input_torque_nm"),
         |variant| Ok(variant.losses(|losses| losses.required_input_torque_nm)),
     ),
-    of_losses("power_loss_w", "W", "Mean power lost, ring fixed.", sweep("/losses/power_loss_w"), |variant| {
+    of_losses("power_loss_w", "W", "Mean power loss, ring fixed.", sweep("/losses/power_loss_w"), |variant| {
         Ok(variant.losses(|losses| losses.power_loss_w.unwrap_or(f64::NAN)))
     }).at_speed(),
     pressure_velocity(
         "pressure_velocity_wave_generator_mpa_m_per_s",
-        "Largest contact stress times slip at the wave generator.",
+        "Largest product of contact stress and sliding speed at the wave generator.",
         sweep("/losses/pressure_velocity_mpa_m_per_s/wave_generator/value"),
         |variant| Ok(variant.pressure_velocity(|peaks| &peaks.wave_generator)),
     ),
     pressure_velocity(
         "pressure_velocity_ring_mpa_m_per_s",
-        "Largest contact stress times slip at the ring.",
+        "Largest product of contact stress and sliding speed at the ring.",
         sweep("/losses/pressure_velocity_mpa_m_per_s/ring/value"),
         |variant| Ok(variant.pressure_velocity(|peaks| &peaks.ring)),
     ),
     pressure_velocity(
         "pressure_velocity_carrier_mpa_m_per_s",
-        "Largest contact stress times slip at the carrier.",
+        "Largest product of contact stress and sliding speed at the carrier.",
         sweep("/losses/pressure_velocity_mpa_m_per_s/carrier/value"),
         |variant| Ok(variant.pressure_velocity(|peaks| &peaks.carrier)),
     ),
@@ -692,12 +692,12 @@ impl Quantity {
         Self { needs: Needs::FrictionAndSpeed, ..self }
     }
 
-    /// The quantity of this name.
+    /// Returns the quantity with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         QUANTITIES.iter().find(|quantity| quantity.name == name)
     }
 
-    /// Its value.
+    /// Computes the value.
     pub(crate) fn of(&self, variant: &Variant<'_>) -> Result<f64, NotConverged> {
         (self.of)(variant)
     }

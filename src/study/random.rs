@@ -1,7 +1,7 @@
-//! Chance from a counter: Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011). Every number is
-//! a function of the seed, its stream and its place in it, so that no stream depends on who draws it, or when.
+//! Counter-based random numbers: Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2,
+//! 3", SC 2011). Every number is a function of seed, stream and index, so the order of computation does not matter.
 
-/// Numbers of one stream.
+/// A stream of random numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct Stream {
     key: [u32; 2],
@@ -10,7 +10,7 @@ pub(crate) struct Stream {
     used: usize,
 }
 
-/// The ten rounds over a counter under a key.
+/// Computes ten rounds of Philox.
 const fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     const MULTIPLIERS: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
     const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
@@ -39,7 +39,7 @@ const fn low(product: u64) -> u32 {
 }
 
 impl Stream {
-    /// A stream under a seed, from its beginning.
+    /// Starts a stream with a seed.
     pub(crate) const fn new(seed: u64, stream: u64) -> Self {
         Self { key: [low(seed), high(seed)], counter: [0, 0, low(stream), high(stream)], words: [0; 4], used: 4 }
     }
@@ -55,21 +55,21 @@ impl Stream {
         self.words[self.used - 1]
     }
 
-    /// A share: equally likely anywhere from 0 to below 1, in steps of 2⁻⁵³.
+    /// Returns a uniform number in [0, 1), in steps of 2⁻⁵³.
     pub(crate) fn share(&mut self) -> f64 {
         let bits = u64::from(self.word()) << 32 | u64::from(self.word());
         (bits >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// A whole number below another one, which is small.
+    /// Returns a uniform whole number below `count`, which is small.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of items")]
     pub(crate) fn below(&mut self, count: usize) -> usize {
         ((self.share() * count as f64) as usize).min(count.saturating_sub(1))
     }
 
-    /// Of the standard normal distribution (Box and Muller 1958).
+    /// Returns a standard normal number (Box and Muller 1958).
     pub(crate) fn normal(&mut self) -> f64 {
-        // 1 less a share is never 0.
+        // The argument of the logarithm is never 0.
         let radius = (-2.0 * (1.0 - self.share()).ln()).sqrt();
         radius * (2.0 * std::f64::consts::PI * self.share()).cos()
     }
@@ -79,9 +79,9 @@ impl Stream {
 mod tests {
     use super::{Stream, philox};
 
-    /// The vectors that come with the authors' Random123.
+    /// Test vectors of the authors' Random123.
     #[test]
-    fn the_rounds_are_those_of_the_known_answers() {
+    fn rounds_match_known_answers() {
         assert_eq!(philox([0; 4], [0; 2]), [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]);
         assert_eq!(philox([u32::MAX; 4], [u32::MAX; 2]), [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]);
         let counter = [0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344];
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_are_even_and_normal_numbers_normal() {
+    fn numbers_have_their_distributions() {
         const COUNT: u32 = 100_000;
         let mut stream = Stream::new(7, 3);
         let shares: f64 = (0..COUNT).map(|_| stream.share()).sum();

@@ -1,51 +1,51 @@
-//! What ranks of a sample say of the distribution that it was drawn from.
+//! Order statistics: estimates of a distribution from the ranks of a sample.
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// What a confidence interval leaves out on either side.
+/// Probability outside a confidence interval on each side.
 const TAIL: f64 = 0.025;
 
-/// Its quantile of the standard normal distribution.
+/// The quantile of the standard normal distribution for `TAIL`.
 const NORMAL_QUANTILE: f64 = 1.959_963_984_540_054;
 
 /// A quantile with its confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct QuantileAnswer {
-    /// The share of drives at or below it.
+    /// Fraction of drives at or below the quantile.
     pub share: f64,
     /// The quantile.
     pub value: f64,
-    /// Where it lies at least, with 97.5 % confidence; left out where the sample is too small to say.
+    /// Lower confidence bound (97.5 %). Absent if the sample is too small.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub low: Option<f64>,
-    /// Where it lies at most, with 97.5 % confidence; likewise.
+    /// Upper confidence bound (97.5 %). Absent if the sample is too small.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub high: Option<f64>,
 }
 
-/// A share of a sample with its confidence interval of 95 %.
+/// A fraction of a sample with its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct ShareAnswer {
-    /// The share.
+    /// The fraction.
     pub share: f64,
-    /// Where it lies at least.
+    /// Lower end of the confidence interval.
     pub low: f64,
-    /// Where it lies at most.
+    /// Upper end of the confidence interval.
     pub high: f64,
 }
 
-/// Ranks from 1, of which none may be there.
+/// Ranks of a confidence interval, from 1. Absent if the sample is too small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Ranks {
     low: Option<u64>,
     high: Option<u64>,
 }
 
-/// The quantile of a sorted sample, and its confidence interval from ranks: whatever the distribution, the number of values below its quantile
-/// is binomial (H. A. David, H. N. Nagaraja, Order Statistics, 2003, section 7.1).
+/// Returns a quantile of a sorted sample, and its confidence interval from ranks. For every distribution the number of
+/// values below its quantile is binomial (H. A. David, H. N. Nagaraja, Order Statistics, 2003, section 7.1).
 pub(crate) fn quantile(sorted: &[f64], share: f64) -> Option<QuantileAnswer> {
     let count = sorted.len();
     let rank = whole(share * count as f64).clamp(1, count.max(1) as u64);
@@ -59,11 +59,11 @@ fn whole(rank: f64) -> u64 {
     rank.ceil() as u64
 }
 
-/// Of how many values below the quantile both tails hold at most 2.5 %.
+/// Returns the ranks outside of which each tail has a probability of at most 2.5 %.
 fn ranks(count: u64, share: f64) -> Ranks {
     let n = count as f64;
     let spread = (n * share * (1.0 - share)).sqrt();
-    // Beyond ten standard deviations and a few nothing is left of the distribution.
+    // The probability beyond ten standard deviations and 30 more is negligible.
     let from = whole((n * share - 10.0 * spread - 30.0).max(0.0)).min(count);
     let to = whole(n * share + 10.0 * spread + 30.0).min(count);
     let log_probability = |k: u64| {
@@ -73,7 +73,7 @@ fn ranks(count: u64, share: f64) -> Ranks {
     let mut below = 0.0;
     let mut found = Ranks { low: None, high: None };
     for k in from..=to {
-        // So far `below` is the probability of fewer than k values below the quantile.
+        // Here `below` is the probability of fewer than k values below the quantile.
         if below <= TAIL {
             found.low = (k > 0).then_some(k);
         }
@@ -86,7 +86,8 @@ fn ranks(count: u64, share: f64) -> Ranks {
     found
 }
 
-/// `ln n!` of a whole number: Stirling's series, summed directly where that is not exact to all digits.
+/// Computes `ln n!` for a whole number: by Stirling's series, and for small n by the product, because the series is
+/// less exact.
 fn log_factorial(n: f64) -> f64 {
     if n < 32.0 {
         let mut product = 1.0;
@@ -101,7 +102,7 @@ fn log_factorial(n: f64) -> f64 {
     (n + 0.5) * n.ln() - n + 0.5 * (2.0 * std::f64::consts::PI).ln() + series
 }
 
-/// A share with Wilson's interval (Journal of the American Statistical Association 22, 1927, 209-212).
+/// Returns a fraction with Wilson's interval (Journal of the American Statistical Association 22, 1927, 209-212).
 pub(crate) fn share(good: u64, count: u64) -> Option<ShareAnswer> {
     if count == 0 {
         return None;
@@ -117,15 +118,15 @@ pub(crate) fn share(good: u64, count: u64) -> Option<ShareAnswer> {
 mod tests {
     use super::{Ranks, log_factorial, quantile, ranks, share};
 
-    /// P(B ≤ 39) = 0.0176, P(B ≤ 40) = 0.0284 for B of 100 tosses; the interval is the textbooks'.
+    /// P(B ≤ 39) = 0.0176, P(B ≤ 40) = 0.0284 for B of 100 tosses. Textbooks have this interval.
     #[test]
-    fn the_median_of_a_hundred_lies_between_the_40th_and_the_61st() {
+    fn median_of_100_has_textbook_ranks() {
         assert_eq!(ranks(100, 0.5), Ranks { low: Some(40), high: Some(61) });
     }
 
-    /// 0.5^5 on either side is above 2.5 %, 0.5^6 is not.
+    /// 0.5^5 on each side is above 2.5 %, 0.5^6 is not.
     #[test]
-    fn of_five_nothing_can_be_said_and_of_six_the_ends_hold_the_median() {
+    fn median_interval_needs_six_values() {
         assert_eq!(ranks(5, 0.5), Ranks { low: None, high: None });
         assert_eq!(ranks(6, 0.5), Ranks { low: Some(1), high: Some(6) });
     }
@@ -144,9 +145,9 @@ mod tests {
         assert!((log_factorial(40.0) / product - 1.0).abs() < 1e-14);
     }
 
-    /// Wilson's interval for 10 of 10 begins at 1/(1 + z²/n).
+    /// Wilson's interval for 10 of 10 starts at 1/(1 + z²/n).
     #[test]
-    fn ten_good_ones_of_ten_are_no_certainty() {
+    fn ten_of_ten_have_wilson_interval() {
         let all = share(10, 10);
         let low = 1.0 / (1.0 + super::NORMAL_QUANTILE.powi(2) / 10.0);
         assert!(all.is_some_and(|all| (all.low - low).abs() < 1e-12 && all.high > 0.999_999), "{all:?}");

@@ -1,4 +1,4 @@
-//! Variants in rows: what maps, sensitivities and tolerances have in common. Each variant follows from its number alone.
+//! Variants in rows, for maps, sensitivity and tolerance studies. Each variant depends on its number alone.
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
@@ -14,27 +14,27 @@ use crate::evaluate::{Evaluator, Outcome, Reason, Refusal, Stopped};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{GRAIN_BYTES, Template};
 
-/// What tells the documents of the variants.
+/// Source of the documents of the variants.
 pub(crate) trait Rows {
-    /// The document of a variant, put into the template.
+    /// Fills the template with the values of a variant.
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree;
 }
 
 /// Rows of consecutive variants.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RowsPart {
-    /// Variants that have quantities.
+    /// Variants with quantities.
     pub(crate) answered: Vec<u64>,
-    /// A column for each quantity.
+    /// One column for each quantity.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// Variants that have none.
+    /// Variants without quantities.
     pub(crate) refused: Vec<u64>,
-    /// Which of the refusals each has.
+    /// Index into `refusals` for each refused variant.
     pub(crate) reasons: Vec<u32>,
     pub(crate) refusals: Vec<RefusalNoted>,
 }
 
-/// A kind of refusal with the first of its kind.
+/// A reason with its number of variants and the first of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RefusalNoted {
     pub(crate) reason: Reason,
@@ -44,7 +44,7 @@ pub(crate) struct RefusalNoted {
 }
 
 impl RefusalNoted {
-    /// Counts more of its kind.
+    /// Counts further variants with this reason.
     fn add(&mut self, first: u64, count: u64, detail: &str) {
         self.count += count;
         if first < self.first {
@@ -52,7 +52,7 @@ impl RefusalNoted {
         }
     }
 
-    /// About what it takes in memory.
+    /// Estimated memory in bytes.
     pub(crate) fn bytes(&self) -> usize {
         let Reason { code, pointer } = &self.reason;
         size_of::<Self>()
@@ -60,20 +60,20 @@ impl RefusalNoted {
     }
 }
 
-/// Rows as a table wants them, of a part or of an answer.
+/// Rows of a part or an answer, as a table needs them.
 #[derive(Debug)]
 pub(crate) struct RowsView<'a> {
     pub(crate) answered: &'a [u64],
-    /// Each quantity by its name.
+    /// The quantities with their names.
     pub(crate) columns: Vec<(&'a str, &'a [f64])>,
     pub(crate) refused: &'a [u64],
     pub(crate) reasons: &'a [u32],
-    /// Of each reason.
+    /// The code of each reason.
     pub(crate) codes: Vec<&'a str>,
 }
 
 impl<'a> RowsView<'a> {
-    /// A row a variant, in their order: its number, its place, its quantities or the code of its reason.
+    /// Returns a table with one row for each variant: number, place, quantities or the reason's code.
     pub(crate) fn table(self, places: Vec<Column>, place: impl Fn(u64) -> Vec<Cell> + 'a) -> Table<'a> {
         let mut columns = vec![Column::new("variant", Content::Count)];
         columns.extend(places);
@@ -109,7 +109,7 @@ impl<'a> RowsView<'a> {
     }
 }
 
-/// Rows as they are worked out.
+/// Rows that are being computed.
 #[derive(Debug)]
 pub(crate) struct RowsWork {
     template: Template,
@@ -131,7 +131,7 @@ impl RowsPart {
         self.refusals.shrink_to_fit();
     }
 
-    /// About what it takes in memory.
+    /// Estimated memory in bytes.
     pub(crate) fn bytes(&self) -> usize {
         let columns = self.columns.iter().map(|column| size_of::<Vec<f64>>() + size_of_val(column.as_slice()));
         let refusals = self.refusals.iter().map(RefusalNoted::bytes);
@@ -174,12 +174,12 @@ impl RowsPart {
     }
 }
 
-/// The rows of a study that have come, in the order of their variants and as they came: of many there is no room for a copy.
+/// The computed rows of a study, in the order of their variants. They are borrowed, because a copy may exceed memory.
 #[derive(Debug)]
 pub(crate) struct RowsParts<'a>(pub(crate) Vec<&'a RowsPart>);
 
 impl RowsParts<'_> {
-    /// All of them in one.
+    /// Joins all rows.
     pub(crate) fn joined(&self, quantities: usize) -> RowsPart {
         let mut rows = RowsPart::new(quantities);
         let (answered, refused): (Vec<_>, Vec<_>) =
@@ -195,7 +195,7 @@ impl RowsParts<'_> {
         rows
     }
 
-    /// The rows of these variants: each part with those that it has of them.
+    /// Returns the rows of these variants: each part with its range of rows.
     pub(crate) fn within(&self, variants: RangeInclusive<u64>) -> impl Iterator<Item = (&RowsPart, Range<usize>)> {
         self.0.iter().map(move |part| {
             let first = part.answered.partition_point(|variant| variant < variants.start());
@@ -203,7 +203,7 @@ impl RowsParts<'_> {
         })
     }
 
-    /// A quantity's values in these variants.
+    /// Returns the values of a quantity in these variants.
     pub(crate) fn values(&self, quantity: usize, variants: RangeInclusive<u64>) -> Vec<f64> {
         let mut values = Vec::with_capacity(self.within(variants.clone()).map(|(_, rows)| rows.len()).sum());
         for (part, rows) in self.within(variants) {
@@ -212,7 +212,7 @@ impl RowsParts<'_> {
         values
     }
 
-    /// Why those of these variants that have no quantities have none.
+    /// Returns the reasons of those variants that have no quantities.
     pub(crate) fn reasons(&self, variants: RangeInclusive<u64>) -> impl Iterator<Item = &Reason> {
         self.0.iter().flat_map(move |part| {
             let first = part.refused.partition_point(|variant| variant < variants.start());
@@ -221,10 +221,10 @@ impl RowsParts<'_> {
         })
     }
 
-    /// Every reason with how many variants have it.
+    /// Returns every reason with its number of variants.
     pub(crate) fn refusals(&self) -> Vec<RefusalNoted> {
         let mut refusals: Vec<RefusalNoted> = Vec::new();
-        // There may be as many as inputs, in each of a hundred thousand parts.
+        // A hash map, because each of 100 000 parts may have as many reasons as there are inputs.
         let mut places = HashMap::new();
         for noted in self.0.iter().flat_map(|part| &part.refusals) {
             match places.entry(&noted.reason) {
@@ -239,7 +239,7 @@ impl RowsParts<'_> {
     }
 }
 
-/// Counts refusals under their reason, and returns its number.
+/// Counts variants with a refusal, and returns the index of its reason.
 pub(crate) fn note(refusals: &mut Vec<RefusalNoted>, first: u64, count: u64, refusal: Refusal) -> u32 {
     let index = refusals.iter().position(|noted| noted.reason == refusal.reason).unwrap_or_else(|| {
         refusals.push(RefusalNoted { reason: refusal.reason, detail: refusal.detail.clone(), first, count: 0 });
@@ -254,7 +254,7 @@ impl RowsWork {
         Self { template, next: variants.start, end: variants.end, part: RowsPart::new(quantities) }
     }
 
-    /// One variant further; whether that was the last one.
+    /// Computes one variant. Returns true if it was the last one.
     pub(crate) fn step(&mut self, rows: &impl Rows, evaluator: &Evaluator, stop: &dyn Stop) -> Result<bool, Stopped> {
         if self.next < self.end {
             let document = rows.document(&mut self.template, self.next);
@@ -270,18 +270,19 @@ impl RowsWork {
     }
 }
 
-/// Why variants are impossible, and how many.
+/// Reason for missing answers, with the number of variants.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ReasonAnswer {
-    /// The code of the field at fault, or of the problem where no field is.
+    /// Code of the field's error, or of the problem if no field is wrong.
     pub code: String,
-    /// The field at fault, by JSON pointer into the design, of a list's entries the list; empty where none is.
+    /// JSON pointer to the wrong field in the design. For an entry of a list it is the list; without a field it is
+    /// empty.
     pub pointer: String,
-    /// Variants that have no answer for this reason.
+    /// Number of variants with this reason.
     pub variants: u64,
-    /// The first of them.
+    /// The first of these variants.
     pub first_variant: u64,
-    /// What was wrong with that one.
+    /// Message for the first variant.
     pub detail: String,
 }
 
@@ -292,20 +293,20 @@ impl From<&RefusalNoted> for ReasonAnswer {
     }
 }
 
-/// Quantities in columns of equal length, one entry a variant.
+/// Variants with an answer, in columns of equal length.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct PossibleAnswer {
-    /// Which variants.
+    /// Numbers of the variants.
     pub variant: Vec<u64>,
-    /// A column for each quantity, by its name.
+    /// One column for each quantity, by name.
     pub quantities: BTreeMap<&'static str, Vec<f64>>,
 }
 
 /// Variants without an answer, in columns of equal length.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ImpossibleAnswer {
-    /// Which variants.
+    /// Numbers of the variants.
     pub variant: Vec<u64>,
-    /// Which of the reasons, from 0.
+    /// Index into `reasons` for each variant, from 0.
     pub reason: Vec<u32>,
 }

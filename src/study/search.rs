@@ -1,4 +1,4 @@
-//! A search: the best designs within limits, and why there are no better ones.
+//! Search: the best designs within limits, and the limits that prevent better ones.
 
 use std::collections::BTreeMap;
 
@@ -25,32 +25,32 @@ use crate::rows::{ReasonAnswer, RefusalNoted, note};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Domain, Template, Value, Variable};
 
-/// Evaluations of an island, about; each is a chunk.
+/// Approximate evaluations of an island. Each island is a chunk.
 const ISLAND_EVALUATIONS: u64 = 12_500;
 
-/// Of an island's evaluations, the share that scans.
+/// Divisor: this fraction of an island's evaluations is the scan.
 const SCAN_SHARE: u64 = 5;
 
-/// Evaluations at true peaks beside those of the front.
+/// Evaluations with accurate peaks in addition to those of the front.
 const TRUE_EVALUATIONS: u64 = 300;
 
-/// The tolerance of true peaks.
+/// Relative tolerance of accurate peaks.
 const TRUE_PEAKS: f64 = 1e-6;
 
-/// A duty is swept over the same input angles at all its points, and not to a tolerance: its front over so many intervals at least.
+/// Samples of a front with a duty. A duty is swept over the same input angles at all its points, without a tolerance.
 const SAMPLES_OF_DUTY: f64 = 200.0;
 
-/// Intervals of the period that are looked at before, where the base says nothing.
+/// Samples of the period during the search, if the base names none.
 const SAMPLES: f64 = 16.0;
 
 const KIND: &str = "/drive/wave_generator/kind";
 const TOOTH_COUNT: &str = "/drive/teeth/count";
 
-/// The range of the teeth's number, as documents have it.
+/// Range of the number of teeth, as in design documents.
 const LEAST_COUNT: f64 = 2.0;
 const LARGEST_COUNT: f64 = 10_000.0;
 
-/// A search that can be carried out.
+/// A checked search.
 #[derive(Debug, Clone)]
 pub(crate) struct Search {
     limits: Vec<Limit>,
@@ -59,7 +59,7 @@ pub(crate) struct Search {
     evaluations: u64,
     seed: u64,
     start: Vec<Vec<f64>>,
-    /// The documents with true peaks, where sampled ones are looked at before.
+    /// Template for accurate peaks, if the search itself uses sampled peaks.
     at_true_peaks: Option<Template>,
 }
 
@@ -69,7 +69,7 @@ struct Objective {
     goal: Goal,
 }
 
-/// What an island comes to.
+/// Result of an island.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IslandPart {
     evaluated: u64,
@@ -79,12 +79,12 @@ pub struct IslandPart {
     scan: Scan,
 }
 
-/// What the scan saw.
+/// Counts of the scan.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Scan {
     variants: u64,
     good: u64,
-    /// Of each limit, how many were beyond it, and how many beyond it alone.
+    /// For each limit, the variants that violate it, and those that violate it alone.
     fell: Vec<u64>,
     fell_alone: Vec<u64>,
     refused: u64,
@@ -123,13 +123,13 @@ impl Scan {
     }
 }
 
-/// An island as it is worked on.
+/// An island that is being computed.
 #[derive(Debug)]
 pub(crate) struct Island {
     optimiser: Optimiser,
     template: Template,
     is_true: bool,
-    /// A point with whether it is of the scan.
+    /// A proposed point, and true if it belongs to the scan.
     pending: Option<(Vec<f64>, bool)>,
     evaluated: u64,
     scan: Scan,
@@ -180,7 +180,7 @@ impl Search {
         if document.start.len() as u64 > most {
             let count = document.start.len();
             let detail = format!(
-                "each of {islands} islands looks at {of_an_island} variants and begins with all of these: at most {most}, not {count}, or more `evaluations`"
+                "`start` has {count} designs. Each of {islands} islands evaluates {of_an_island} variants, so use at most {most} designs, or more `evaluations`"
             );
             return Err(fault("/start", FieldCode::OutOfRange, detail));
         }
@@ -191,33 +191,34 @@ impl Search {
         self.islands
     }
 
-    /// Variants, but for how many of each front are looked at again.
+    /// Number of variants, without those of the fronts that are evaluated again.
     pub(crate) const fn evaluations(&self) -> u64 {
         self.evaluations
     }
 
-    /// What the fronts of all islands take, each point a few columns wide.
+    /// Bytes of the stored fronts of all islands.
     pub(crate) fn stored_bytes(&self, quantities: usize, variables: usize) -> u64 {
         let numbers = quantities + variables + self.limits.len() + self.objectives.len();
         let points = crate::optimise::MOST_OF_FRONT + self.limits.len() + 1;
         self.islands * (8 * numbers * points) as u64
     }
 
-    /// What the documents take of which the true peaks are looked at.
+    /// Bytes of the template for accurate peaks.
     pub(crate) fn template_bytes(&self) -> usize {
         self.at_true_peaks.as_ref().map_or(0, Template::bytes)
     }
 
-    /// What the designs of an answer take, whole documents each, of which the longest takes so much as a tree: those of the front, or, where there is
-    /// none, those that come nearest.
+    /// Bytes of the designs in an answer: those of the front or, without one, the nearest ones. `document_bytes` is the
+    /// largest document as a tree.
     pub(crate) fn designs_bytes(&self, document_bytes: usize) -> u64 {
-        /// Of a design with its quantities, beside its lists, whose numbers take a quarter of what they do in a tree.
+        /// Bytes of a design with its quantities, without its lists. Numbers of lists take a quarter of their size in a
+        /// tree.
         const DESIGN_BYTES: usize = 8192;
         let designs = (2 * crate::optimise::MOST_OF_FRONT).max(self.limits.len() + 1);
         (designs * (DESIGN_BYTES + document_bytes / 2)) as u64
     }
 
-    /// That what is free changes every objective, and every quantity that is beyond its limit else.
+    /// Checks that the free fields change every objective, and every quantity that violates its limit otherwise.
     pub(crate) fn require_that_free_fields_matter(
         &self,
         template: &Template,
@@ -225,7 +226,7 @@ impl Search {
         limits: &question::Limits,
     ) -> Result<(), NoAnswer> {
         if !template.varies_within(&[""]) {
-            let detail = "nothing is free: each range and each choice holds one value only";
+            let detail = "nothing is free: each range and each list has only one value. Widen a range";
             return Err(fault("/free", FieldCode::Unaffected, detail));
         }
         let is_said = |place: &str| {
@@ -237,7 +238,10 @@ impl Search {
         for (index, objective) in self.objectives.iter().enumerate() {
             let quantity = quantities[objective.quantity];
             if !is_affected(quantity) {
-                let detail = format!("nothing that is free changes `{}`", quantity.name);
+                let detail = format!(
+                    "no free field changes `{}`. Remove this objective, or free a field that changes it",
+                    quantity.name
+                );
                 return Err(fault(&format!("/objectives/{index}/quantity"), FieldCode::Unaffected, detail));
             }
         }
@@ -254,7 +258,10 @@ impl Search {
                     Bound::Is => "",
                 };
                 let at = format!("/require/{}{end}", escaped(quantity.name));
-                let detail = format!("nothing that is free changes `{}`: it is {value:?}", quantity.name);
+                let detail = format!(
+                    "no free field changes `{}`, which is {value:?}. Change this limit, or free a field that changes it",
+                    quantity.name
+                );
                 return Err(beyond(&at, FieldCode::Unaffected, detail, limit.limit, value));
             }
         }
@@ -273,7 +280,7 @@ impl Search {
     }
 }
 
-/// What a quantity of the drive alone is in some variant, if one of a few can be.
+/// Returns the value of a drive's quantity in one of some random variants, if one of them is possible.
 fn some_value(quantity: &'static Quantity, template: &Template, limits: &question::Limits) -> Option<f64> {
     const TRIES: u64 = 64;
     let evaluator = Evaluator::new(vec![quantity], *limits);
@@ -284,7 +291,7 @@ fn some_value(quantity: &'static Quantity, template: &Template, limits: &questio
         let values = variable_values(&template, &place);
         match evaluator.outcome(template.filled(&values), &Never) {
             Ok(Outcome::Answered(values)) => values.first().copied(),
-            // Of a drive alone nothing takes room.
+            // A drive without a load needs no memory limit.
             Ok(Outcome::Refused(_)) | Err(Stopped) => None,
         }
     })
@@ -293,14 +300,10 @@ fn some_value(quantity: &'static Quantity, template: &Template, limits: &questio
 fn objectives(document: &SearchDocument, quantities: &mut Vec<&'static Quantity>) -> Result<Vec<Objective>, NoAnswer> {
     let asked = &document.objectives;
     if asked.is_empty() {
-        return Err(fault(
-            "/objectives",
-            FieldCode::MissingField,
-            "a search needs an objective: name a quantity and a goal",
-        ));
+        return Err(fault("/objectives", FieldCode::MissingField, "`objectives` is empty. Name a quantity and a goal"));
     }
     if asked.len() > MOST_OBJECTIVES {
-        let detail = format!("a search has at most {MOST_OBJECTIVES} objectives, not {}", asked.len());
+        let detail = format!("use at most {MOST_OBJECTIVES} objectives; there are {}", asked.len());
         return Err(fault("/objectives", FieldCode::OutOfRange, detail));
     }
     let mut objectives: Vec<Objective> = Vec::new();
@@ -308,7 +311,7 @@ fn objectives(document: &SearchDocument, quantities: &mut Vec<&'static Quantity>
         let at = format!("/objectives/{index}/quantity");
         let quantity = index_of(named(&objective.quantity, &at)?, quantities);
         if objectives.iter().any(|other| other.quantity == quantity) {
-            let detail = format!("`{}` is an objective already", objective.quantity);
+            let detail = format!("`{}` is listed twice. Remove one", objective.quantity);
             return Err(fault(&at, FieldCode::ConflictingFields, detail));
         }
         objectives.push(Objective { quantity, goal: objective.goal });
@@ -316,8 +319,8 @@ fn objectives(document: &SearchDocument, quantities: &mut Vec<&'static Quantity>
     Ok(objectives)
 }
 
-/// What is free where nothing is said: the wave generator, of two lobes where the base names none, the teeth and their number, within the
-/// limits on the outer diameter and the transmission ratio. What stands in the base stays.
+/// Derives the free fields if the document names none. They are the wave generator (two lobes by default), the teeth
+/// and their number, within the limits on outer diameter and transmission ratio. Fields of the base stay fixed.
 fn from_envelope(
     document: &SearchDocument,
     base: &mut Tree,
@@ -329,7 +332,7 @@ fn from_envelope(
     };
     let missing = |what: &str| {
         let detail = format!(
-            "nothing is free, and nothing follows from `require`: {what} there, or name fields with their ranges here"
+            "nothing is free, and `require` is not sufficient to derive free fields. In `require`, {what}; or name free fields with their ranges here"
         );
         fault("/free", FieldCode::MissingField, detail)
     };
@@ -341,12 +344,12 @@ fn from_envelope(
             put_in(base, &path(TOOTH_COUNT).unwrap_or_default(), Tree::Number(count));
         } else {
             let (Some(least_ratio), Some(largest_ratio)) = range(TRANSMISSION_RATIO) else {
-                return Err(missing("limit `transmission_ratio` from both sides"));
+                return Err(missing("set `min` and `max` of `transmission_ratio`"));
             };
             let (min, max) = ((lobes * least_ratio).ceil(), (lobes * largest_ratio).floor());
             if min.max(LEAST_COUNT) > max.min(LARGEST_COUNT) {
                 let detail = format!(
-                    "no number of teeth has such a ratio beside a ring of fewer: it is their number, {LEAST_COUNT:?} to {LARGEST_COUNT:?}, over the lobes of the wave generator, here {lobes:?}"
+                    "no number of teeth gives this transmission ratio with a ring of fewer teeth. The ratio is the number of teeth ({LEAST_COUNT:?} to {LARGEST_COUNT:?}) over the number of lobes ({lobes:?})"
                 );
                 let nearest = min.clamp(LEAST_COUNT, LARGEST_COUNT) / lobes;
                 return Err(beyond("/require/transmission_ratio", FieldCode::OutOfRange, detail, least_ratio, nearest));
@@ -360,9 +363,9 @@ fn from_envelope(
     let lengths: Vec<_> = lengths.into_iter().filter(|(pointer, ..)| is_missing(base, pointer)).collect();
     if !lengths.is_empty() {
         let Some(diameter_mm) = range(OUTER_DIAMETER_MM).1 else {
-            return Err(missing("limit `outer_diameter_mm` from above"));
+            return Err(missing("set `max` of `outer_diameter_mm`"));
         };
-        // As drawn, a rim included.
+        // Half of the outer diameter without the rim of the drawn ring.
         let root_mm = 0.5 * diameter_mm / RIM;
         let range = Parameter::ToothRadius.range();
         for &(_, least, largest) in &lengths {
@@ -372,7 +375,9 @@ fn from_envelope(
             {
                 let scale = if limit_mm > smallest_mm { largest } else { least };
                 let limit_mm = 2.0 * RIM * limit_mm / scale;
-                let detail = format!("no drive of {diameter_mm:?} mm has lengths within their ranges");
+                let detail = format!(
+                    "a drive with an outer diameter of {diameter_mm:?} mm has lengths outside their allowed ranges. Change this limit"
+                );
                 return Err(beyond(
                     "/require/outer_diameter_mm/max",
                     FieldCode::OutOfRange,
@@ -388,13 +393,13 @@ fn from_envelope(
         }));
     }
     if free.is_empty() {
-        let detail = "nothing is free: the base names everything that would be; take fields out of it, or name them here with their ranges";
+        let detail = "nothing is free: the base sets all fields that could be free. Remove some from the base, or name them here with their ranges";
         return Err(fault("/free", FieldCode::MissingField, detail));
     }
     Ok(())
 }
 
-/// Puts a value into the base, but not in the place of what reading it refuses.
+/// Sets a value in the base, unless a parent is not an object. Parsing will report that.
 fn put_in(base: &mut Tree, place: &[String], value: Tree) {
     let has_fields = |length: usize| base.at(&place[..length]).is_none_or(|tree| matches!(tree, Tree::Object(_)));
     if (0..place.len()).all(has_fields) {
@@ -402,8 +407,8 @@ fn put_in(base: &mut Tree, place: &[String], value: Tree) {
     }
 }
 
-/// The lobes of the base's wave generator. Where it names none, one is put in, whose path tells the teeth's extremes; where it does not say
-/// how many lobes, they are two.
+/// Returns the number of lobes of the base's wave generator. A missing wave generator becomes a harmonic path; a
+/// missing number of lobes becomes two.
 fn with_wave_generator(base: &mut Tree) -> Result<f64, NoAnswer> {
     const LOBES: &str = "/drive/wave_generator/lobes";
     const TWO: f64 = 2.0;
@@ -419,19 +424,19 @@ fn with_wave_generator(base: &mut Tree) -> Result<f64, NoAnswer> {
                 return Ok(*lobes);
             }
             let limit = if *lobes < 1.0 { 1.0 } else { MOST };
-            let detail = format!("must lie between 1 and {MOST:?}, not be {lobes:?}");
+            let detail = format!("{lobes:?} lobes are out of range. Use 1 to {MOST:?}");
             Err(beyond(&format!("/base{LOBES}"), FieldCode::OutOfRange, detail, *lobes, limit))
         }
         (Some("harmonic" | "harmonic_path"), None) => {
             put_in(base, &place(LOBES), Tree::Number(TWO));
             Ok(TWO)
         }
-        // An ellipse, or what reading the base refuses.
+        // An ellipse, or a kind that parsing the base will refuse.
         _ => Ok(TWO),
     }
 }
 
-/// The lengths that the base's wave generator and teeth have, with their least and largest over the ring's root radius.
+/// Returns the lengths of the base's wave generator and teeth, with their ranges over the ring's root radius.
 fn lengths_over_root_radius(base: &Tree) -> Vec<(&'static str, f64, f64)> {
     let mut lengths = match word_at(base, KIND) {
         None | Some("ellipse") => {
@@ -448,7 +453,7 @@ fn lengths_over_root_radius(base: &Tree) -> Vec<(&'static str, f64, f64)> {
             ("/drive/wave_generator/mean_path_radius_mm", 0.4, 1.0),
             ("/drive/wave_generator/amplitude_mm", 0.002, 0.08),
         ],
-        // Reading the base refuses it.
+        // Parsing the base refuses it.
         Some(_) => Vec::new(),
     };
     lengths.push(("/drive/teeth/radius_mm", 0.02, 0.15));
@@ -468,7 +473,7 @@ fn word_at<'a>(tree: &'a Tree, pointer: &str) -> Option<&'a str> {
     }
 }
 
-/// Where a design stands among what is free.
+/// Returns the place of a design in the unit cube of the free fields.
 fn place_of(design: &Tree, template: &Template, index: usize) -> Result<Vec<f64>, NoAnswer> {
     let at = |variable: &Variable| format!("/start/{index}{}", variable.pointer);
     let mut values = Vec::new();
@@ -479,12 +484,12 @@ fn place_of(design: &Tree, template: &Template, index: usize) -> Result<Vec<f64>
             (Domain::Real { min, max } | Domain::Whole { min, max }, Some(Tree::Number(number))) => {
                 if !(*min..=*max).contains(number) {
                     let limit = if number < min { *min } else { *max };
-                    let detail = format!("{number:?} lies outside what is free, {min:?} to {max:?}");
+                    let detail = format!("{number:?} is outside the free range. Use {min:?} to {max:?}");
                     return Err(beyond(&at(variable), FieldCode::OutOfRange, detail, *number, limit));
                 }
                 let is_whole = matches!(variable.domain, Domain::Whole { .. });
                 if is_whole && number.fract() != 0.0 {
-                    let detail = format!("a whole number is wanted here, not {number:?}");
+                    let detail = format!("{number:?} is not a whole number. Use a whole number");
                     return Err(fault(&at(variable), FieldCode::WrongType, detail));
                 }
                 let share = match (is_whole, max > min) {
@@ -496,18 +501,18 @@ fn place_of(design: &Tree, template: &Template, index: usize) -> Result<Vec<f64>
             }
             (Domain::OneOf(count), Some(chosen)) => {
                 let Some(choice) = variable.choices().iter().position(|choice| choice == chosen) else {
-                    let detail = "none of the choices that are free";
+                    let detail = "the value is not in the free list. Use a value of `one_of`";
                     return Err(fault(&at(variable), FieldCode::UnknownChoice, detail));
                 };
                 (Value::Choice(choice), (choice as f64 + 0.5) / *count as f64)
             }
             (Domain::Real { .. } | Domain::Whole { .. }, Some(_)) => {
-                return Err(fault(&at(variable), FieldCode::WrongType, "a number is wanted here"));
+                return Err(fault(&at(variable), FieldCode::WrongType, "the value is not a number. Use a number"));
             }
-            // What a kind does not take may stand anywhere.
+            // A field that the kind does not have can have any place.
             (Domain::Real { min, .. } | Domain::Whole { min, .. }, None) => (Value::Number(*min), 0.5),
             (Domain::OneOf(_), None) => {
-                let detail = "it is free: a design to begin with says which";
+                let detail = "the field is free, but this design has no value for it. Add a value";
                 return Err(fault(&at(variable), FieldCode::MissingField, detail));
             }
         };
@@ -517,7 +522,7 @@ fn place_of(design: &Tree, template: &Template, index: usize) -> Result<Vec<f64>
     let missing = template.taken(&values).find(|variable| design.at(variable.path()).is_none());
     match missing {
         Some(variable) => {
-            let detail = "it is free: a design to begin with says where it stands";
+            let detail = "the field is free, but this design has no value for it. Add a value";
             Err(fault(&at(variable), FieldCode::MissingField, detail))
         }
         None => Ok(place),
@@ -526,7 +531,7 @@ fn place_of(design: &Tree, template: &Template, index: usize) -> Result<Vec<f64>
 
 impl Island {
     pub(crate) fn new(search: &Search, template: Template, island: u64) -> Self {
-        // The first islands have one more each, so that all of them come to what is asked.
+        // The first islands have one more evaluation each, so that the sum is the requested number.
         let evaluations = search.evaluations / search.islands + u64::from(island < search.evaluations % search.islands);
         let scan = evaluations / SCAN_SHARE;
         let scan_from = island * (search.evaluations.div_ceil(search.islands) / SCAN_SHARE + 1);
@@ -543,9 +548,9 @@ impl Island {
         }
     }
 
-    /// One variant further; whether that was the last one.
+    /// Computes one variant. Returns true if it was the last one.
     pub(crate) fn step(&mut self, search: &Search, evaluator: &Evaluator, stop: &dyn Stop) -> Result<bool, Stopped> {
-        // A point that was asked for when the work was interrupted is taken up again.
+        // A point that was interrupted is computed again.
         let (place, is_scanning) = match self.pending.take() {
             Some(pending) => pending,
             None => {
@@ -610,7 +615,7 @@ fn variable_values(template: &Template, place: &[f64]) -> Vec<Value> {
 }
 
 impl IslandPart {
-    /// About what it takes in memory.
+    /// Estimated memory in bytes.
     pub(crate) fn bytes(&self) -> usize {
         let points = self.front.iter().chain(self.relaxations.iter().flatten()).chain(&self.nearest);
         let places = size_of_val(self.relaxations.as_slice()) + size_of_val(self.front.as_slice());
@@ -628,107 +633,107 @@ impl IslandPart {
     }
 }
 
-/// The best designs within limits, and why there are no better ones.
+/// Result of a search: the best designs within limits, and the limits that prevent better ones.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SearchAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
-    /// The build that computed it: equal builds on equal processors give equal bytes.
+    /// Build of the program. Equal builds on equal processors give equal bytes.
     pub build: &'static str,
-    /// Whether every variant was looked at.
+    /// True if every variant is computed.
     pub is_complete: bool,
-    /// Variants that were looked at.
+    /// Number of computed variants.
     pub evaluated: u64,
-    /// What was free.
+    /// The free fields.
     pub free: Vec<FreeAnswer>,
-    /// The designs that none beats in every objective, by the first objective. Their figures are true peaks.
+    /// Pareto front, ordered by the first objective. Its figures are accurate peaks.
     pub front: Vec<FoundAnswer>,
-    /// Each limit, with what fell to it.
+    /// The limits, with the numbers of variants that violate them.
     pub limits: Vec<LimitAnswer>,
-    /// What an even scan of all that is free saw.
+    /// Counts of the even scan of all free fields.
     pub scan: ScanAnswer,
-    /// Where nothing keeps all limits, the design that is least beyond them altogether.
+    /// If no design meets all limits: the design with the smallest sum of violations.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub nearest_miss: Option<FoundAnswer>,
-    /// Where nothing keeps all limits: for each that can be relaxed alone, how far it must be.
+    /// If no design meets all limits: for each limit that can be relaxed alone, the needed value.
     pub relaxations: Vec<RelaxationAnswer>,
-    /// The names of the quantities in the order of the columns.
+    /// Names of the quantities in the order of the columns.
     #[serde(skip)]
     #[schema(ignore)]
     quantities: Vec<&'static str>,
 }
 
-/// What was free.
+/// A free field.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FreeAnswer {
     /// JSON pointer into the design.
     pub pointer: String,
-    /// Its least value.
+    /// Smallest value of a range.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub min: Option<f64>,
-    /// Its largest.
+    /// Largest value of a range.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub max: Option<f64>,
-    /// How many choices it has, where it is one.
+    /// Number of values of a list.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub choices: Option<u64>,
 }
 
-/// A design that was found.
+/// A design that the search found.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FoundAnswer {
-    /// The whole document: every endpoint takes it.
+    /// The complete design document. Every endpoint accepts it.
     pub design: Design,
-    /// Its quantities: objectives and those that are limited.
+    /// The quantities of objectives and limits.
     pub quantities: BTreeMap<&'static str, f64>,
 }
 
-/// A limit, with what fell to it.
+/// A limit, with the numbers of variants that violate it.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LimitAnswer {
-    /// The quantity.
+    /// Name of the quantity.
     pub quantity: &'static str,
-    /// On which side of it the quantity has to be.
+    /// Side of the limit.
     pub bound: Bound,
-    /// The limit.
+    /// Value of the limit.
     pub limit: f64,
-    /// Variants of the scan that were beyond it.
+    /// Variants of the scan that violate it.
     pub fell: u64,
-    /// Those that were beyond this limit alone.
+    /// Variants of the scan that violate it alone.
     pub fell_alone: u64,
     /// Designs of the front that are within 1 % of it.
     pub binds: u64,
 }
 
-/// What an even scan of all that is free saw.
+/// Counts of the even scan of all free fields.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ScanAnswer {
-    /// Variants that were looked at.
+    /// Number of variants.
     pub variants: u64,
-    /// Those that keep every limit.
+    /// Variants that meet all limits.
     pub good: u64,
-    /// Those that no drive can be.
+    /// Variants that are impossible drives.
     pub impossible: u64,
-    /// Why not.
+    /// Reasons for the impossible variants.
     pub reasons: Vec<ReasonAnswer>,
 }
 
-/// How far a limit must be relaxed for something to be possible, all others kept.
+/// Needed relaxation of one limit, with all other limits met.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct RelaxationAnswer {
-    /// The quantity.
+    /// Name of the quantity.
     pub quantity: &'static str,
-    /// On which side of it the quantity has to be.
+    /// Side of the limit.
     pub bound: Bound,
-    /// The limit as it is.
+    /// Value of the limit.
     pub limit: f64,
-    /// The least change that something was found for.
+    /// Value nearest to the limit for which a design was found.
     pub needed: f64,
-    /// The design that was.
+    /// The design with this value.
     pub found: FoundAnswer,
 }
 
@@ -813,7 +818,7 @@ impl SearchAnswer {
         }
     }
 
-    /// A row a design of the front: its quantities, then the fields that were free.
+    /// Returns a table with one row for each design of the front: quantities, then the free fields.
     pub(crate) fn table(&self) -> Table<'_> {
         let mut columns: Vec<_> = self.quantities.iter().map(|name| Column::new(*name, Content::Number)).collect();
         columns.extend(self.free.iter().map(|free| {
@@ -852,7 +857,7 @@ impl From<&Variable> for FreeAnswer {
 }
 
 impl FoundAnswer {
-    /// The design of a point; what was read when it was looked at is read again.
+    /// Reads the design of a point again, with its quantities.
     fn new(template: &mut Template, evaluator: &Evaluator, point: &Point) -> Option<Self> {
         let values = variable_values(template, &point.place);
         let design = template.filled(&values).read::<Design>().ok()?.normalised();

@@ -1,4 +1,4 @@
-//! A sensitivity: each input a little less and a little more, and what that does to each quantity.
+//! Sensitivity study: each input is decreased and increased by a small step.
 
 use std::collections::BTreeMap;
 
@@ -11,20 +11,22 @@ use utoipa::ToSchema;
 use crate::ask::{beyond, escaped, fault};
 use crate::document::{InputDocument, SensitivityDocument};
 use crate::evaluate::Evaluator;
+use crate::identity::complete;
 use crate::rows::{ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, GRAIN_BYTES, Template, Value};
 
-/// How far an input is moved where nothing is said, as a share of its value.
+/// Default step of an input, as a fraction of its value.
 const RELATIVE: f64 = 0.01;
 
-/// The least move of an input, as a share of its value: the rounding of a quantity is then some millionths of its change.
+/// Smallest step of an input, as a fraction of its value. The rounding of a quantity is then some millionths of its
+/// change.
 const LEAST_RELATIVE: f64 = 1e-9;
 
-/// A quantity is called smooth where both one-sided differences agree to this share of them.
+/// A quantity is smooth if both one-sided differences agree within this fraction.
 const SMOOTH: f64 = 0.1;
 
-/// The variants of a sensitivity: the base, then each input less and more.
+/// The variants of a sensitivity study: the base, then each input decreased and increased.
 #[derive(Debug, Clone)]
 pub(crate) struct Sensitivity {
     inputs: Vec<Input>,
@@ -39,66 +41,38 @@ struct Input {
 
 impl Sensitivity {
     pub(crate) fn new(document: &SensitivityDocument) -> Result<(Self, Template), NoAnswer> {
-        let base = &document.base.0;
-        let mut inputs = document.inputs.clone();
-        if inputs.is_empty() {
-            for part in ["drive", "materials", "load"] {
-                let part = [part.to_owned()];
-                if let Some(tree) = base.at(&part) {
-                    numbers(tree, &format!("/{}", part[0]), &mut inputs);
-                }
-            }
-        }
-        let mut moved = Vec::new();
-        for (pointer, input) in &inputs {
-            moved.push(Input::new(base, pointer, input)?);
-        }
-        let free = |input: &Input| {
-            let range = Asked::Range { min: input.value - input.plus_minus, max: input.value + input.plus_minus };
-            (input.pointer.clone(), range)
+        let (base, inputs) = if document.inputs.is_empty() {
+            inputs_by_default(&document.base.0)?
+        } else {
+            (document.base.0.clone(), document.inputs.clone())
         };
-        let free: Vec<_> = moved.iter().map(free).collect();
-        let template = Template::new(base, &free, "inputs")?;
-        let is_given = !document.inputs.is_empty();
+        let (mut moved, template) = moves(&base, &inputs)?;
         for (input, variable) in moved.iter_mut().zip(template.variables()) {
             if matches!(variable.domain, Domain::Whole { .. }) {
-                if document
-                    .inputs
-                    .get(&input.pointer)
-                    .is_some_and(|input| input.plus_minus.is_some_and(|by| by.fract() != 0.0))
-                {
+                if inputs[&input.pointer].plus_minus.is_some_and(|by| by.fract() != 0.0) {
                     let at = format!("/inputs/{}/plus_minus", escaped(&input.pointer));
-                    return Err(fault(&at, FieldCode::WrongType, "a whole number is wanted here"));
+                    return Err(fault(&at, FieldCode::WrongType, "the step is not a whole number. Use a whole number"));
                 }
                 input.plus_minus = input.plus_minus.ceil();
-            }
-        }
-        // Counts are moved only where that is asked for: a drive with another number of teeth is another drive.
-        if !is_given {
-            let counted: Vec<_> =
-                template.variables().iter().map(|variable| matches!(variable.domain, Domain::Whole { .. })).collect();
-            if counted.contains(&true) {
-                let inputs = moved.iter().zip(&counted).filter(|(_, counted)| !**counted);
-                let inputs: BTreeMap<_, _> =
-                    inputs.map(|(input, _)| (input.pointer.clone(), InputDocument::default())).collect();
-                if inputs.is_empty() {
-                    let detail = "the base has no number but counts and zeros: name what is to be moved";
-                    return Err(fault("/inputs", FieldCode::MissingField, detail));
-                }
-                return Self::new(&SensitivityDocument { inputs, ..document.clone() });
             }
         }
         Ok((Self { inputs: moved }, template))
     }
 
-    /// What the answer takes: of each quantity an entry for each input.
+    /// Each input with its step, in one form for all spellings.
+    pub(crate) fn asked(&self) -> Tree {
+        let asked = |input: &Input| [Tree::Text(input.pointer.clone()), Tree::Number(input.plus_minus)];
+        Tree::Array(self.inputs.iter().flat_map(asked).collect())
+    }
+
+    /// Bytes of the answer: for each quantity an entry for each input.
     pub(crate) fn answer_bytes(&self, quantities: usize) -> u64 {
-        // A text takes a few bytes more than it has.
+        // 16 bytes for the overhead of a string.
         let an_input = |input: &Input| size_of::<SensitivityToInput>() + input.pointer.len() + 16;
         (quantities * self.inputs.iter().map(an_input).sum::<usize>()) as u64
     }
 
-    /// About what it takes in memory beside its template.
+    /// Estimated memory without its template, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.inputs.iter().map(|input| size_of::<Input>() + GRAIN_BYTES + input.pointer.len()).sum()
     }
@@ -108,7 +82,39 @@ impl Sensitivity {
     }
 }
 
-/// The numbers below a place that are not zero. Of a duty without its shares of the time, none of which moves alone.
+/// Completes the defaults of `drive`, `materials` and `load`, and collects their nonzero numbers except counts: another number
+/// of teeth is another drive.
+fn inputs_by_default(base: &Tree) -> Result<(Tree, BTreeMap<String, InputDocument>), NoAnswer> {
+    let complete = complete(base)?;
+    let (mut base, mut inputs) = (base.clone(), BTreeMap::new());
+    for name in ["drive", "materials", "load"] {
+        let part = [name.to_owned()];
+        if let Some(tree) = complete.at(&part) {
+            base.set(&part, tree.clone());
+            numbers(tree, &format!("/{name}"), &mut inputs);
+        }
+    }
+    let (_, template) = moves(&base, &inputs)?;
+    for variable in template.variables().iter().filter(|variable| matches!(variable.domain, Domain::Whole { .. })) {
+        inputs.remove(&variable.pointer);
+    }
+    Ok((base, inputs))
+}
+
+/// Returns each input with its step, and the template of the variants.
+fn moves(base: &Tree, inputs: &BTreeMap<String, InputDocument>) -> Result<(Vec<Input>, Template), NoAnswer> {
+    let moved: Vec<_> =
+        inputs.iter().map(|(pointer, input)| Input::new(base, pointer, input)).collect::<Result<_, _>>()?;
+    let free = |input: &Input| {
+        let range = Asked::Range { min: input.value - input.plus_minus, max: input.value + input.plus_minus };
+        (input.pointer.clone(), range)
+    };
+    let free: Vec<_> = moved.iter().map(free).collect();
+    let template = Template::new(base, &free, "inputs")?;
+    Ok((moved, template))
+}
+
+/// Collects the nonzero numbers below a place, except a duty's time shares, which cannot change alone.
 fn numbers(tree: &Tree, at: &str, found: &mut BTreeMap<String, InputDocument>) {
     match tree {
         Tree::Number(number) if *number != 0.0 => {
@@ -132,31 +138,29 @@ impl Input {
     fn new(base: &Tree, pointer: &str, input: &InputDocument) -> Result<Self, NoAnswer> {
         let at = format!("/inputs/{}", escaped(pointer));
         let Some(Tree::Number(value)) = path(pointer).and_then(|path| base.at(&path)) else {
-            let detail = "the base has no number here: write it down there, even where it is the default";
+            let detail = "the base has no number here. Write it into the base, even if it is the default";
             return Err(fault(&at, FieldCode::MissingField, detail));
         };
         let plus_minus = match (input.plus_minus, input.relative) {
             (Some(_), Some(_)) => {
-                let detail = "at most one of `plus_minus` and `relative` may stand here";
+                let detail = "both `plus_minus` and `relative` are given. Remove one";
                 return Err(fault(&at, FieldCode::ConflictingFields, detail));
             }
             (Some(plus_minus), None) => plus_minus,
             (None, Some(relative)) if relative > 1.0 => {
-                let detail = format!("an input is moved by its whole value at most, not by {relative:?} times it");
+                let detail = format!("`relative` is {relative:?}. Use at most 1");
                 return Err(beyond(&format!("{at}/relative"), FieldCode::OutOfRange, detail, relative, 1.0));
             }
             (None, relative) => relative.unwrap_or(RELATIVE) * value.abs(),
         };
         if plus_minus.is_nan() || plus_minus <= 0.0 {
-            let detail = format!("an input is moved by more than zero, not by {plus_minus:?}: give `plus_minus`");
+            let detail = format!("the step is {plus_minus:?}. Set `plus_minus` to a value above zero");
             return Err(fault(&at, FieldCode::OutOfRange, detail));
         }
         let least = LEAST_RELATIVE * value.abs();
         if plus_minus < least {
             let name = if input.relative.is_some() { "relative" } else { "plus_minus" };
-            let detail = format!(
-                "a move of {plus_minus:?} about {value:?} changes a quantity by no more than its rounding: choose {least:?} or more"
-            );
+            let detail = format!("a step of {plus_minus:?} at {value:?} is lost in rounding. Use {least:?} or more");
             return Err(beyond(&format!("{at}/{name}"), FieldCode::OutOfRange, detail, plus_minus, least));
         }
         Ok(Self { pointer: pointer.into(), value: *value, plus_minus })
@@ -164,7 +168,7 @@ impl Input {
 }
 
 impl Sensitivity {
-    /// The inputs' values of a variant.
+    /// Returns the values of the inputs in a variant.
     fn values(&self, variant: u64) -> impl Iterator<Item = f64> {
         let moved = variant.checked_sub(1).map(|moved| (moved / 2, moved % 2));
         (0..).zip(&self.inputs).map(move |(index, input)| match moved {
@@ -181,57 +185,57 @@ impl Rows for Sensitivity {
     }
 }
 
-/// What each input does to each quantity.
+/// Result of a sensitivity study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SensitivityAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
-    /// The build that computed it: equal builds on equal processors give equal bytes.
+    /// Build of the program. Equal builds on equal processors give equal bytes.
     pub build: &'static str,
-    /// Whether every variant was looked at.
+    /// True if every variant is computed.
     pub is_complete: bool,
-    /// Each quantity, with what moves it most first; none where the base itself has no answer.
+    /// The quantities, each with its inputs, the strongest first. A quantity is absent if the base has no answer.
     pub quantities: Vec<SensitivityOfQuantity>,
-    /// Why variants have no answer. The base is variant 0, the input i less 2i + 1, more 2i + 2.
+    /// Reasons for missing answers. Variant 0 is the base; input i decreased is 2i + 1, increased 2i + 2.
     pub reasons: Vec<ReasonAnswer>,
 }
 
-/// What moves a quantity.
+/// The effect of the inputs on one quantity.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SensitivityOfQuantity {
-    /// Its name.
+    /// Name of the quantity.
     pub quantity: &'static str,
-    /// Its value at the base.
+    /// Value at the base.
     pub value: f64,
-    /// The inputs, what moves it most first.
+    /// The inputs, the strongest first.
     pub inputs: Vec<SensitivityToInput>,
 }
 
-/// What an input does to a quantity.
+/// The effect of one input on one quantity.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SensitivityToInput {
     /// JSON pointer into the design.
     pub pointer: String,
-    /// The input's value at the base.
+    /// Value of the input at the base.
     pub value: f64,
-    /// How far it was moved either way.
+    /// Step in both directions.
     pub plus_minus: f64,
-    /// The quantity with the input less; left out where that has no answer.
+    /// The quantity with the input decreased. Absent if that variant has no answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub at_minus: Option<f64>,
-    /// The quantity with the input more; left out where that has no answer.
+    /// The quantity with the input increased. Absent if that variant has no answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub at_plus: Option<f64>,
-    /// The largest change either way; 0 where neither has an answer.
+    /// Largest change in either direction, or 0 if both variants have no answer.
     pub change: f64,
-    /// Change of the quantity over change of the input, between less and more; left out where one of them has no answer or both ways
-    /// differ by more than a tenth: by a kink, a jump or a bend.
+    /// Central difference quotient. Absent if one variant has no answer, or if the two one-sided differences differ by
+    /// more than 10 % (a kink, a jump or curvature).
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub derivative: Option<f64>,
-    /// Whether both ways agree, so that there is a derivative.
+    /// True if both one-sided differences agree, so that there is a derivative.
     pub is_smooth: bool,
 }
 
@@ -262,7 +266,7 @@ impl SensitivityAnswer {
         4096 + inputs.map(|input| 220 + input.pointer.len()).sum::<usize>()
     }
 
-    /// A row a quantity and input.
+    /// Returns a table with one row for each quantity and input.
     pub(crate) fn table(&self) -> Table<'_> {
         let words = ["quantity", "pointer"].map(|name| Column::new(name, Content::Word));
         let numbers = ["value", "plus_minus", "at_minus", "at_base", "at_plus", "change", "derivative"];
@@ -294,7 +298,7 @@ impl SensitivityToInput {
         let below = at_minus.map(|at_minus| value - at_minus);
         let above = at_plus.map(|at_plus| at_plus - value);
         let change = [below, above].into_iter().flatten().map(f64::abs).fold(0.0, f64::max);
-        // What rounding alone does to the value is no kink.
+        // Rounding of the value must not count as a kink.
         let rounding = 64.0 * f64::EPSILON * value.abs();
         let both = below.zip(above);
         let is_smooth = both

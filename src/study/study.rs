@@ -1,4 +1,4 @@
-//! The engine: a study is pure chunks, and a merge that does not depend on their order.
+//! The engine of studies: pure chunks, and a merge that does not depend on their order.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashSet};
@@ -30,18 +30,18 @@ use crate::sensitivity::{Sensitivity, SensitivityAnswer};
 use crate::tolerance::{Tolerance, ToleranceAnswer};
 use crate::variant::{Domain, Template, Variable};
 
-/// What studies are computed at most.
+/// Limits of studies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Those of each variant.
+    /// Limits of each variant.
     pub calculation: question::Limits,
     /// Most variants of a study.
     pub max_study_variants: u64,
-    /// Most bytes of what studies come to.
+    /// Most bytes of a study with its result.
     pub max_study_bytes: u64,
 }
 
-/// A study that can be carried out.
+/// A checked study.
 #[derive(Debug)]
 pub struct Study {
     id: Key,
@@ -49,7 +49,7 @@ pub struct Study {
     template: Template,
     evaluator: Evaluator,
     variants: u64,
-    /// Of a chunk in rows.
+    /// Variants of a chunk with rows.
     chunk_variants: u64,
 }
 
@@ -61,24 +61,24 @@ enum Kind {
     Tolerance(Tolerance),
 }
 
-/// What a chunk comes to. It can be kept anywhere and merged in any order.
+/// Result of a chunk. Parts can be stored anywhere and merged in any order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Part {
-    /// Of a map, a sensitivity or a tolerance study.
+    /// Part of a map, a sensitivity or a tolerance study.
     Rows(RowsPart),
-    /// Of a search.
+    /// Part of a search.
     Island(IslandPart),
 }
 
 impl Part {
-    /// Gives back what it has not filled.
+    /// Frees unused capacity.
     fn shrink(&mut self) {
         if let Self::Rows(rows) = self {
             rows.shrink();
         }
     }
 
-    /// About what it takes in memory.
+    /// Estimated memory in bytes.
     pub fn bytes(&self) -> usize {
         size_of::<Self>()
             + match self {
@@ -87,7 +87,7 @@ impl Part {
             }
     }
 
-    /// Variants that it has looked at.
+    /// Number of computed variants.
     pub const fn variants(&self) -> u64 {
         match self {
             Self::Rows(rows) => (rows.answered.len() + rows.refused.len()) as u64,
@@ -95,7 +95,7 @@ impl Part {
         }
     }
 
-    /// Of those, the ones without an answer; of a search those of its scan.
+    /// Number of computed variants without an answer. For a search, those of its scan.
     pub const fn refused(&self) -> u64 {
         match self {
             Self::Rows(rows) => rows.refused.len() as u64,
@@ -105,13 +105,13 @@ impl Part {
 }
 
 impl Study {
-    /// The study that a text asks for.
+    /// Reads a study document and checks it.
     ///
     /// # Errors
-    /// Whatever is known to be impossible before anything is computed, at the field that says so.
+    /// Fails if the study is known to be impossible before it is computed. The error names the field.
     pub fn read(text: &[u8], limits: &Limits) -> Result<Self, NoAnswer> {
         let document = {
-            // Gone before more is made of it.
+            // The tree is dropped before the study is made.
             let tree = json::tree(text)?;
             require_each_field_once(&tree)?;
             tree.read()?
@@ -119,17 +119,18 @@ impl Study {
         Self::new(&document, limits)
     }
 
-    /// The study that a document asks for.
+    /// Checks a study document.
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// The same as [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
         let mut study = Self::unnamed(document, limits)?;
-        study.id = identity::id(document, &study.template, &study.evaluator.quantities, &limits.calculation)?;
+        let inputs = if let Kind::Sensitivity(sensitivity) = &study.kind { Some(sensitivity.asked()) } else { None };
+        study.id = identity::id(document, &study.template, &study.evaluator.quantities, inputs, &limits.calculation)?;
         Ok(study)
     }
 
-    /// The study before its id is known.
+    /// Makes the study without its id.
     fn unnamed(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
         match document {
             StudyDocument::Map(map) => {
@@ -179,20 +180,22 @@ impl Study {
         let evaluator = Evaluator::new(quantities, limits.calculation);
         let study =
             Self { id: Key::default(), kind, template, evaluator, variants, chunk_variants: chunk_variants(variants) };
-        #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
+        #[expect(clippy::cast_precision_loss, reason = "a number in a message")]
         if variants > limits.max_study_variants {
             let limit = limits.max_study_variants;
-            let detail = format!("the study has {variants} variants, more than the {limit} of `max_study_variants`");
+            let detail = format!(
+                "the study has {variants} variants, but `max_study_variants` allows at most {limit}. Use fewer"
+            );
             let mut refused = beyond("", FieldCode::TooManyVariants, detail, variants as f64, limit as f64);
             refused.code = NoAnswerCode::TooManyVariants;
             return Err(refused);
         }
         let bytes = study.kept_bytes().max(study.answer_bytes());
-        #[expect(clippy::cast_precision_loss, reason = "told, not computed with")]
+        #[expect(clippy::cast_precision_loss, reason = "a number in a message")]
         if bytes > limits.max_study_bytes {
             let limit = limits.max_study_bytes;
             let detail = format!(
-                "the study with what it comes to takes {bytes} bytes, more than the {limit} of `max_study_bytes`: ask for fewer variants or quantities, or of a shorter base"
+                "the study with its result needs {bytes} bytes, but `max_study_bytes` allows at most {limit}. Use fewer variants or quantities, or a shorter base"
             );
             let mut refused = beyond("", FieldCode::TooManyVariants, detail, bytes as f64, limit as f64);
             refused.code = NoAnswerCode::TooManyVariants;
@@ -201,7 +204,7 @@ impl Study {
         Ok(study)
     }
 
-    /// The same study, of deviations from a design that can be, by whose nature it can deviate so.
+    /// Checks that the base design is possible, and that it can deviate as requested.
     fn with_possible_base(self, limits: &Limits) -> Result<Self, NoAnswer> {
         let mut template = self.template.clone();
         let mut refused = |rows: &dyn Rows, variant: u64| {
@@ -213,7 +216,7 @@ impl Study {
             Kind::Sensitivity(sensitivity) => refused(sensitivity, 0).map(|refused| (refused, "/base")),
             Kind::Tolerance(tolerance) => match refused(tolerance, 0) {
                 Some(refused) => Some((refused, "/base")),
-                // That one drive cannot be is its own fault, but not that no drive of this model takes deviations.
+                // A single impossible drive is a result of the study. A model without deviations is an error.
                 None => refused(tolerance, 1).filter(is_of_every_draw).map(|refused| (refused, "")),
             },
         };
@@ -226,12 +229,12 @@ impl Study {
         Err(refused)
     }
 
-    /// What tells it from every other one: a hash of what is asked, of the limits of each variant, of the build and of the machine's arithmetic.
+    /// The id: a hash of the question, the limits of each variant, the build and the machine's arithmetic.
     pub const fn id(&self) -> Key {
         self.id
     }
 
-    /// The kind, as documents spell it.
+    /// The kind, as in documents.
     pub const fn kind(&self) -> &'static str {
         match self.kind {
             Kind::Map(_) => "map",
@@ -241,12 +244,12 @@ impl Study {
         }
     }
 
-    /// Variants that it looks at.
+    /// Number of variants.
     pub const fn variants(&self) -> u64 {
         self.variants
     }
 
-    /// Chunks that it consists of, each a computation of its own.
+    /// Number of chunks. Each is a separate computation.
     pub const fn chunks(&self) -> u64 {
         match &self.kind {
             Kind::Search(search) => search.islands(),
@@ -254,14 +257,14 @@ impl Study {
         }
     }
 
-    /// The same study in chunks of so many variants each: its result is the same, to the bit. The islands of a search stay as they are, since
-    /// what they find depends on how many there are.
+    /// Returns the same study with another chunk size. The result is the same, to the bit. A search keeps its islands,
+    /// because its result depends on their number.
     #[must_use]
     pub fn in_chunks_of(self, variants: u64) -> Self {
         Self { chunk_variants: variants.max(1), ..self }
     }
 
-    /// What a chunk consists of: variants, or an island of a search.
+    /// Returns the range of a chunk: its variants, or one island of a search.
     fn span_of(&self, chunk: u64) -> Range<u64> {
         if matches!(self.kind, Kind::Search(_)) {
             return chunk..chunk + 1;
@@ -270,7 +273,7 @@ impl Study {
         first..self.variants.min(first.saturating_add(self.chunk_variants))
     }
 
-    /// About what it takes to keep what it comes to.
+    /// Estimated bytes of the stored results.
     pub fn stored_bytes(&self) -> u64 {
         const OVERHEAD: u64 = 1 << 14;
         let quantities = self.evaluator.quantities.len();
@@ -283,12 +286,12 @@ impl Study {
         OVERHEAD.saturating_add(bytes)
     }
 
-    /// About what its answer takes beside what is kept, while it is made.
+    /// Estimated bytes of the answer while it is made, with the stored results.
     pub fn answer_bytes(&self) -> u64 {
         self.stored_bytes().saturating_add(self.told_bytes())
     }
 
-    /// About what its answer takes when it is made, but for what is as much as is stored.
+    /// Estimated bytes of the answer without the stored results.
     pub fn told_bytes(&self) -> u64 {
         let quantities = self.evaluator.quantities.len();
         match &self.kind {
@@ -299,7 +302,7 @@ impl Study {
         }
     }
 
-    /// About what it takes to keep it with what it comes to.
+    /// Estimated memory of the study with its results, in bytes.
     pub fn kept_bytes(&self) -> u64 {
         let of_kind = match &self.kind {
             Kind::Map(map) => map.bytes(),
@@ -311,25 +314,26 @@ impl Study {
     }
 }
 
-/// Variants of a chunk. It follows from what is asked alone, so that any process cuts a study into the same chunks.
+/// Returns the chunk size. It depends on the question alone, so that every process makes the same chunks.
 fn chunk_variants(variants: u64) -> u64 {
     /// Some tens of milliseconds of the cheapest variants.
     const MOST_VARIANTS: u64 = 4096;
-    /// Of a study of slow variants little is lost with one chunk, and several cores are busy.
+    /// Enough chunks that several cores work on slow variants, and that a lost chunk costs little.
     const LEAST_CHUNKS: u64 = 256;
-    /// Whoever reads a result goes through a list of them.
+    /// The list of chunks stays short enough for its readers.
     const MOST_CHUNKS: u64 = 100_000;
     variants.div_ceil(LEAST_CHUNKS).clamp(1, MOST_VARIANTS).max(variants.div_ceil(MOST_CHUNKS))
 }
 
-/// That no object names a field twice: of two ranges or limits of one name one would be dropped without a word.
+/// Checks that no object has a field twice. Otherwise one of two ranges or limits with the same name would be dropped
+/// silently.
 fn require_each_field_once(tree: &Tree) -> Result<(), Fault> {
     match tree {
         Tree::Object(fields) => {
             let mut names = HashSet::new();
             for (name, value) in fields {
                 if !names.insert(name) {
-                    let detail = format!("the field `{name}` stands here twice");
+                    let detail = format!("the field `{name}` is given twice. Remove one");
                     return Err(Fault::of_field(FieldCode::DuplicateField, name, detail));
                 }
                 require_each_field_once(value).map_err(|found| found.within(name))?;
@@ -346,7 +350,8 @@ fn require_each_field_once(tree: &Tree) -> Result<(), Fault> {
     }
 }
 
-/// The quantities of these names; all that every document has what they need for, where none is named.
+/// Returns the quantities with these names. Without names, returns all quantities for which every document has the
+/// required fields.
 fn asked_quantities(names: &[String], template: &Template) -> Result<Vec<&'static Quantity>, NoAnswer> {
     if names.is_empty() {
         let has = template.examples().map(what_it_has).min().unwrap_or(Needs::Drive);
@@ -369,12 +374,12 @@ fn has_allowable_stress(tree: &Tree) -> bool {
     at(tree, &["load", "allowable_stress_mpa"]).is_some()
 }
 
-/// Whether it says how fast the wave generator turns; every point of a duty does.
+/// True if the document sets the speed of the wave generator. Every point of a duty does.
 fn has_speed(tree: &Tree) -> bool {
     [["load", "input_speed_rpm"], ["load", "duty"]].iter().any(|place| at(tree, place).is_some())
 }
 
-/// The most that quantities may need, allowable stresses apart.
+/// Returns the highest need that the document meets, without allowable stresses.
 fn what_it_has(tree: &Tree) -> Needs {
     let has = |place: &[&str]| at(tree, place).is_some();
     match (has(&["load"]), has(&["friction"]), has_speed(tree)) {
@@ -385,7 +390,7 @@ fn what_it_has(tree: &Tree) -> Needs {
     }
 }
 
-/// That a document has what every quantity needs.
+/// Checks that a document has the fields that its quantities need.
 fn require_what_quantities_need(quantities: &[&'static Quantity], tree: &Tree) -> Result<(), NoAnswer> {
     for quantity in quantities {
         let needed: &[(&[&str], &str)] = match quantity.needs {
@@ -403,14 +408,14 @@ fn require_what_quantities_need(quantities: &[&'static Quantity], tree: &Tree) -
             ],
         };
         if let Some((place, what)) = needed.iter().find(|(place, _)| at(tree, place).is_none()) {
-            let detail = format!("`{}` needs {what}, and the base has none", quantity.name);
+            let detail = format!("`{}` needs {what}, but the base has none. Add it", quantity.name);
             return Err(fault(&format!("/base/{}", place.join("/")), FieldCode::MissingField, detail));
         }
     }
     Ok(())
 }
 
-/// Whatever is known to be wrong with a document before it is computed.
+/// Checks a document without computing it.
 fn check(quantities: &[&'static Quantity], document: &Tree, limits: &question::Limits) -> Result<(), NoAnswer> {
     let design = document.read::<Design>()?.normalised();
     if quantities.iter().all(|quantity| quantity.needs == Needs::Drive) {
@@ -420,13 +425,13 @@ fn check(quantities: &[&'static Quantity], document: &Tree, limits: &question::L
     }
 }
 
-/// Whether no draw of deviations can be asked, whatever their amounts.
+/// True if no random drive can have an answer, for any amount of deviation.
 fn is_of_every_draw(refused: &NoAnswer) -> bool {
     refused.code == NoAnswerCode::TooManyStates
         || refused.errors.iter().any(|error| error.code == FieldCode::ConflictingFields)
 }
 
-/// That of every range of a free number some lies within what its field may be.
+/// Checks that every range of a free number overlaps the allowed range of its field.
 fn require_possible_ranges(
     quantities: &[&'static Quantity],
     template: &Template,
@@ -434,7 +439,7 @@ fn require_possible_ranges(
 ) -> Result<(), NoAnswer> {
     let errors_of =
         |example: &Tree| check(quantities, example, limits).err().map_or_else(Vec::new, |refused| refused.errors);
-    // Nothing of a range where its largest value is too small, or its least too large.
+    // A range is impossible if its largest value is too small or its smallest value too large.
     for (end, is_below) in [("max", true), ("min", false)] {
         let value = |variable: &Variable| match variable.domain {
             Domain::Real { min, max } | Domain::Whole { min, max } => Some(if is_below { max } else { min }),
@@ -445,7 +450,7 @@ fn require_possible_ranges(
                 && error.code == FieldCode::OutOfRange
                 && error.limit.is_some_and(|limit| (value < limit) == is_below)
         };
-        // All of them at once, as there may be thousands; then by itself what is said to be outside.
+        // All variables at once, because there may be thousands. Then each reported one alone.
         for example in template.examples_at(value) {
             for error in errors_of(&example) {
                 let free = template.variables().iter().enumerate();
@@ -469,7 +474,7 @@ fn require_possible_ranges(
     Ok(())
 }
 
-/// That a document can be asked at all: a fault of its form is one whatever the values, and so is a number of the base outside its range.
+/// Checks that a document has the right form for all values, and that the base's own numbers are in range.
 fn require_possible_base(
     quantities: &[&'static Quantity],
     template: &Template,
@@ -490,10 +495,10 @@ fn require_possible_base(
     Err(refused)
 }
 
-/// Where the relief may begin, the rest of the drive says.
+/// Field whose range depends on the rest of the drive.
 const OF_THE_DRIVE: [&str; 1] = ["/modification/ring_tip_relief/start_deg"];
 
-/// Whether every variant has a fault: a value outside its range, or values that do not go together.
+/// True if every variant has this error: a value out of range, or values that contradict each other.
 fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
     let stands = path(&error.pointer).and_then(|path| example.at(&path));
     match error.code {
@@ -501,7 +506,7 @@ fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
             Some(Tree::Number(_)) => {
                 !template.is_varied(&error.pointer) && !OF_THE_DRIVE.contains(&error.pointer.as_str())
             }
-            // Of a list it is the sum, or how many there are.
+            // For a list the error is about its sum or its length.
             Some(Tree::Array(_)) => !template.varies_within(&[&error.pointer]),
             _ => false,
         },
@@ -528,7 +533,7 @@ fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
     }
 }
 
-/// A chunk as it is worked on, a variant at a time: it may be laid aside between any two of them.
+/// A chunk that is being computed, one variant a step. It can be paused between two steps.
 #[derive(Debug)]
 pub struct Work {
     study: Arc<Study>,
@@ -542,7 +547,7 @@ enum State {
 }
 
 impl Work {
-    /// A chunk of a study, not begun yet.
+    /// Starts a chunk of a study.
     pub fn new(study: &Arc<Study>, chunk: u64) -> Self {
         let state = match &study.kind {
             Kind::Search(search) => State::Island(Box::new(Island::new(search, study.template.clone(), chunk))),
@@ -554,10 +559,10 @@ impl Work {
         Self { study: Arc::clone(study), state }
     }
 
-    /// One variant further; whether that was the last one.
+    /// Computes one variant. Returns true if it was the last one.
     ///
     /// # Errors
-    /// If `stop` says so; the chunk is then as it was before.
+    /// If `stop` is set. The chunk is then the same as before.
     pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Stopped> {
         let Self { study, state } = self;
         let evaluator = &study.evaluator;
@@ -566,12 +571,12 @@ impl Work {
             (Kind::Sensitivity(sensitivity), State::Rows(rows)) => rows.step(sensitivity, evaluator, stop),
             (Kind::Tolerance(tolerance), State::Rows(rows)) => rows.step(tolerance, evaluator, stop),
             (Kind::Search(search), State::Island(island)) => island.step(search, evaluator, stop),
-            // Made for each other above.
+            // `new` never makes this combination.
             (Kind::Search(_), State::Rows(_)) | (_, State::Island(_)) => Ok(true),
         }
     }
 
-    /// What the chunk comes to, once it is over.
+    /// Returns the result of a finished chunk.
     pub fn finish(self) -> Part {
         match self.state {
             State::Rows(rows) => Part::Rows(rows.finish()),
@@ -579,32 +584,32 @@ impl Work {
         }
     }
 
-    /// The whole chunk at once.
+    /// Computes the whole chunk.
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// The same as [`Self::step`].
     pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Stopped> {
         while !self.step(stop)? {}
         Ok(self.finish())
     }
 }
 
-/// The parts of a study, in whatever order they come.
+/// The parts of a study, added in any order.
 #[derive(Debug)]
 pub struct Gathered {
     study: Arc<Study>,
-    /// By their chunks.
+    /// Parts by chunk.
     parts: BTreeMap<u64, Part>,
     variants: u64,
 }
 
 impl Gathered {
-    /// None yet.
+    /// Makes an empty collection.
     pub fn new(study: &Arc<Study>) -> Self {
         Self { study: Arc::clone(study), parts: BTreeMap::new(), variants: 0 }
     }
 
-    /// Takes what a chunk has come to; a second time, or of a chunk that the study does not have, it changes nothing.
+    /// Adds the part of a chunk. A duplicate or unknown chunk changes nothing.
     pub fn add(&mut self, chunk: u64, mut part: Part) {
         if chunk < self.study.chunks()
             && let Entry::Vacant(place) = self.parts.entry(chunk)
@@ -615,17 +620,17 @@ impl Gathered {
         }
     }
 
-    /// Whether all have come.
+    /// True if all chunks have a part.
     pub fn is_complete(&self) -> bool {
         self.parts.len() as u64 == self.study.chunks()
     }
 
-    /// Variants that were looked at.
+    /// Number of computed variants.
     pub const fn variants(&self) -> u64 {
         self.variants
     }
 
-    /// What the study comes to, as far as it has come.
+    /// Returns the result of the study from the parts so far.
     pub fn answer(&self) -> StudyAnswer {
         let study = &*self.study;
         let (evaluator, is_complete) = (&study.evaluator, self.is_complete());
@@ -653,7 +658,7 @@ impl Gathered {
         }
     }
 
-    /// All rows that have come.
+    /// Returns all rows so far.
     fn rows(&self) -> RowsParts<'_> {
         let rows = self.parts.values().filter_map(|part| match part {
             Part::Rows(rows) => Some(rows),

@@ -1,4 +1,4 @@
-//! What a study comes to as a table: one definition of its columns, which CSV and Parquet share.
+//! Table of a study's result: one definition of the columns for CSV and Parquet.
 
 use std::io::{self, Write};
 use std::mem;
@@ -12,23 +12,23 @@ use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types;
 use toothwave_calculation::forms::csv_error;
 
-/// Rows of a group in Parquet, at most, and cells: these are held beside the answer until the group is written.
+/// Most rows and cells of a Parquet row group. They are held in addition to the answer until the group is written.
 const GROUP_ROWS: usize = 1 << 16;
 const GROUP_CELLS: usize = 1 << 19;
 
-/// What Parquet notes of each column of a group, to the end of the file.
+/// Bytes of Parquet metadata for each column of a group, held until the end of the file.
 const NOTE_BYTES: u64 = 1 << 10;
 
-/// A table, its rows made one after the other.
+/// A table with rows that are made one by one.
 pub(crate) struct Table<'a> {
     pub(crate) columns: Vec<Column>,
-    /// How many rows there are.
+    /// Number of rows.
     pub(crate) length: usize,
-    /// Each with a cell for every column.
+    /// Rows, each with a cell for every column.
     pub(crate) rows: Box<dyn Iterator<Item = Vec<Cell>> + 'a>,
 }
 
-/// A column by its name, with what its cells hold where they are not empty.
+/// A column: its name and the type of its cells.
 #[derive(Debug)]
 pub(crate) struct Column {
     name: String,
@@ -75,7 +75,7 @@ impl Cell {
 }
 
 impl Table<'_> {
-    /// A head of names, then a line a row.
+    /// Writes CSV: a header of names, then one line for each row.
     pub(crate) fn write_csv(self, writer: &mut dyn Write) -> io::Result<()> {
         let mut csv = csv::Writer::from_writer(writer);
         csv.write_record(self.columns.iter().map(|column| &column.name)).map_err(csv_error)?;
@@ -85,13 +85,13 @@ impl Table<'_> {
         csv.flush()
     }
 
-    /// Columns of the same names in Apache Parquet; an empty cell is null.
+    /// Writes Apache Parquet with the same columns. An empty cell is null.
     pub(crate) fn write_parquet(mut self, writer: &mut dyn Write) -> io::Result<()> {
         let fields = self.columns.iter().map(|column| column.schema().map(Arc::new));
         let fields = fields.collect::<Result<_, _>>().map_err(parquet_error)?;
         let schema = types::Type::group_type_builder("study").with_fields(fields).build().map_err(parquet_error)?;
         let properties = WriterProperties::builder().build();
-        // Parquet wants a writer of its own: it gets a buffer, which is emptied after each group.
+        // Parquet needs to own its writer, so it gets a buffer that is emptied after each group.
         let file = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties));
         let mut file = file.map_err(parquet_error)?;
         let group_rows = self.group_rows();
@@ -103,12 +103,12 @@ impl Table<'_> {
             write_group(&mut file, &self.columns, &rows).map_err(parquet_error)?;
             file.flush()?;
             writer.write_all(&mem::take(file.inner_mut()))?;
-            // A group may come to a few bytes: whoever wants it stopped is asked after each.
+            // A group may have few bytes. The flush lets the writer check its stop flag.
             writer.flush()?;
         }
     }
 
-    /// About how many bytes writing it as Parquet holds, beside what it is made of and what is written.
+    /// Estimated bytes that writing Parquet holds, without the answer and without the output.
     pub(crate) fn parquet_bytes(&self) -> u64 {
         let (group_rows, columns) = (self.group_rows(), self.columns.len() as u64);
         let of_row: u64 = self.columns.iter().map(Column::cell_bytes).sum();
@@ -122,7 +122,7 @@ impl Table<'_> {
 }
 
 impl Column {
-    /// What a cell takes until its group is written; a word, where it is short.
+    /// Bytes of a cell until its group is written. Words are assumed to be short.
     const fn cell_bytes(&self) -> u64 {
         match self.kind {
             Content::Count | Content::Number => 32 + 8,

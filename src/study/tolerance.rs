@@ -1,4 +1,4 @@
-//! A tolerance study: drives with parts that deviate by chance, and what that does to each quantity.
+//! Tolerance study: drives with random deviations, and the distributions of their quantities.
 
 use serde::Serialize;
 use toothwave_calculation::design::Design;
@@ -18,19 +18,20 @@ use crate::rows::{ReasonAnswer, Rows, RowsPart, RowsParts};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, GRAIN_BYTES, Template, Value, Variable};
 
-/// Drives in which one kind of deviation stands alone, for each kind.
+/// Drives with a single kind of deviation, for each kind.
 const ALONE: u64 = 1000;
 
-/// The quantiles that are told.
+/// Fractions of the quantiles in the answer.
 const SHARES: [f64; 9] = [0.001, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.999];
 
-/// A distribution is not cut off nearer to its middle than this, in standard deviations: draws beyond are drawn again.
+/// Smallest truncation limit of a normal distribution, in standard deviations. Values beyond the limit are drawn again.
 const NEAREST_LIMIT: f64 = 0.01;
 
-/// Draws until one lies within the limits, at most: at the nearest limit all fail with a probability of 1e-34.
+/// Most draws for one value. At the smallest limit all fail with a probability of 1e-34.
 const MOST_DRAWS: u32 = 10_000;
 
-/// The variants of a tolerance study: the drive without deviations, the drives drawn, then those with one kind of deviation alone.
+/// The variants of a tolerance study: the nominal drive, the random drives, then drives with a single kind of
+/// deviation.
 #[derive(Debug, Clone)]
 pub(crate) struct Tolerance {
     kinds: Vec<Kind>,
@@ -42,7 +43,7 @@ pub(crate) struct Tolerance {
 /// A kind of deviation.
 #[derive(Debug, Clone)]
 struct Kind {
-    /// As the study's document has it.
+    /// Name in the study document.
     name: String,
     distribution: Distribution,
     place: Place,
@@ -50,9 +51,9 @@ struct Kind {
 
 #[derive(Debug, Clone)]
 enum Place {
-    /// A list with an entry for each item.
+    /// A list with one entry for each item.
     Items { path: Vec<String>, count: usize },
-    /// A vector.
+    /// A vector with two components.
     Runout { path: Vec<String> },
     /// A number of the base.
     Number { value: f64 },
@@ -69,23 +70,25 @@ impl Distribution {
         let positive = |name: &str, value: Option<f64>| match value {
             Some(value) if value > 0.0 => Ok(value),
             Some(value) => {
-                let detail = format!("`{name}` must be above zero, not {value:?}");
+                let detail = format!("`{name}` is {value:?}. Use a value above zero");
                 Err(fault(&format!("{at}/{name}"), FieldCode::OutOfRange, detail))
             }
-            None => Err(fault(&format!("{at}/{name}"), FieldCode::MissingField, format!("`{name}` is required here"))),
+            None => {
+                Err(fault(&format!("{at}/{name}"), FieldCode::MissingField, format!("`{name}` is missing. Add it")))
+            }
         };
         match document.distribution {
             DistributionKind::Normal => {
                 let sigma = positive("sigma", document.sigma)?;
                 let limit = document.limit.map_or(Ok(f64::INFINITY), |limit| positive("limit", Some(limit)))?;
                 if limit < NEAREST_LIMIT * sigma {
-                    let detail = "the limit is so near that the distribution is uniform within it: choose `uniform`";
+                    let detail = "`limit` is below 1 % of `sigma`, so the distribution is uniform. Use `uniform`";
                     return Err(fault(&format!("{at}/limit"), FieldCode::OutOfRange, detail));
                 }
                 Ok(Self::Normal { sigma, limit })
             }
             DistributionKind::Uniform if document.sigma.is_some() => {
-                let detail = "a uniform distribution has a `limit` and no `sigma`";
+                let detail = "a uniform distribution has no `sigma`. Remove it and use `limit`";
                 Err(fault(&format!("{at}/sigma"), FieldCode::ConflictingFields, detail))
             }
             DistributionKind::Uniform => Ok(Self::Uniform { limit: positive("limit", document.limit)? }),
@@ -105,13 +108,13 @@ impl Distribution {
 }
 
 impl Tolerance {
-    /// Without its limits, which are of quantities.
+    /// Makes the study without limits, because these refer to quantities.
     pub(crate) fn new(document: &ToleranceDocument) -> Result<(Self, Template), NoAnswer> {
         let base = &document.base.0;
         let samples = whole("/samples", document.samples.value(), 10.0, 1e8)?;
         let seed = whole("/seed", document.seed.value(), 0.0, 9_007_199_254_740_991.0)?;
         if document.deviations.is_empty() && document.inputs.is_empty() {
-            let detail = "nothing deviates: name `deviations` or `inputs` with their distributions";
+            let detail = "the study has no deviations. Add `deviations` or `inputs` with their distributions";
             return Err(fault("/deviations", FieldCode::MissingField, detail));
         }
         let mut kinds = Vec::new();
@@ -119,7 +122,7 @@ impl Tolerance {
         for (pointer, distribution) in &document.inputs {
             let at = format!("/inputs/{}", escaped(pointer));
             let Some(Tree::Number(value)) = path(pointer).and_then(|path| base.at(&path)) else {
-                let detail = "the base has no number here: write it down there, even where it is the default";
+                let detail = "the base has no number here. Write it into the base, even if it is the default";
                 return Err(fault(&at, FieldCode::MissingField, detail));
             };
             free.push((pointer.clone(), Asked::Range { min: *value, max: *value }));
@@ -129,10 +132,10 @@ impl Tolerance {
         let mut template = Template::new(base, &free, "inputs")?;
         let counts = template.variables().iter().find(|variable| matches!(variable.domain, Domain::Whole { .. }));
         if let Some(Variable { pointer, .. }) = counts {
-            let detail = "a whole number does not deviate";
+            let detail = "a whole number cannot deviate. Remove this input";
             return Err(fault(&format!("/inputs/{}", escaped(pointer)), FieldCode::WrongType, detail));
         }
-        // It was read just so.
+        // The template has parsed this document already.
         let items = match template.examples().next() {
             Some(example) => Items::of(&example.read::<Design>()?),
             None => Items { slots: 0, ring_spaces: 0, lobes: 0 },
@@ -141,7 +144,7 @@ impl Tolerance {
             let at = format!("/deviations/{}", escaped(name));
             let path = vec!["deviations".to_owned(), name.clone()];
             if base.at(&path).is_some() {
-                let detail = "the study draws these: leave them out of the base";
+                let detail = "the study sets these deviations. Remove them from the base";
                 return Err(fault(
                     &format!("/base/deviations/{}", escaped(name)),
                     FieldCode::ConflictingFields,
@@ -154,7 +157,7 @@ impl Tolerance {
                 "wave_generator_lobe_um" => Place::Items { path, count: items.lobes },
                 "wave_generator_runout" | "ring_runout" | "carrier_runout" => Place::Runout { path },
                 _ => {
-                    let detail = format!("`{name}` is none of the design's `deviations`");
+                    let detail = format!("a design has no deviation `{name}`. Use a name of the design's `deviations`");
                     return Err(fault(&at, FieldCode::UnknownField, detail));
                 }
             };
@@ -162,27 +165,27 @@ impl Tolerance {
             kind.put(&mut template, None);
             kinds.push(kind);
         }
-        // Whether the design knows deviations, and whatever else cannot be read.
+        // Checks that the design's model takes deviations, and that all documents are valid.
         for example in template.examples() {
             example.read::<Design>()?;
         }
         Ok((Self { kinds, samples, seed, limits: Vec::new() }, template))
     }
 
-    /// Drives with one kind of deviation alone, for each; none where there is only one kind.
+    /// Number of drives for each single kind of deviation; none if there is only one kind.
     fn alone(&self) -> u64 {
         if self.kinds.len() > 1 { ALONE.min(self.samples) } else { 0 }
     }
 
-    /// What the answer takes: of each quantity an entry for each kind of deviation, and its histogram.
+    /// Bytes of the answer: for each quantity an entry for each kind of deviation, and a histogram.
     pub(crate) fn answer_bytes(&self, quantities: usize) -> u64 {
         const HISTOGRAM_BYTES: usize = 2048;
-        // A text takes a few bytes more than it has.
+        // 16 bytes for the overhead of a string.
         let a_kind = |kind: &Kind| size_of::<ContributorAnswer>() + kind.name.len() + 16;
         (quantities * (HISTOGRAM_BYTES + self.kinds.iter().map(a_kind).sum::<usize>())) as u64
     }
 
-    /// About what it takes in memory beside its template.
+    /// Estimated memory without its template, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         let of_kind = |kind: &Kind| {
             let path: &[String] = match &kind.place {
@@ -199,8 +202,8 @@ impl Tolerance {
         1 + self.samples + self.alone() * self.kinds.len() as u64
     }
 
-    /// The stream of a kind of deviation in a variant: one of its own for each kind of each sample, so that what stands alone is what it was
-    /// among others. None where it does not deviate.
+    /// Returns the random stream of a kind in a variant, or none without this deviation. Each kind of each sample has
+    /// its own stream. So a single deviation has the same value as in the complete sample.
     fn stream(&self, variant: u64, kind: usize) -> Option<Stream> {
         let stream = |sample: u64| Stream::new(self.seed, (sample << 16) | kind as u64);
         match self.drawn(variant) {
@@ -210,7 +213,7 @@ impl Tolerance {
         }
     }
 
-    /// The sample whose chance a variant has, and the kind that it keeps of it.
+    /// Returns the sample of a variant, and the single kind that deviates.
     fn drawn(&self, variant: u64) -> Drawn {
         match variant.checked_sub(1) {
             None => Drawn::Nominal,
@@ -230,7 +233,7 @@ enum Drawn {
     Alone { sample: u64, kind: usize },
 }
 
-/// How many items of each sort the drive has.
+/// Numbers of items of the drive.
 struct Items {
     slots: usize,
     ring_spaces: usize,
@@ -240,7 +243,7 @@ struct Items {
 impl Items {
     fn of(design: &Design) -> Self {
         let parameters = design.drive_parameters();
-        // Of more a base is refused, and not before these stand in it.
+        // A base with more teeth is refused, but only after these lists are set.
         let count = |count: i64| usize::try_from(count.min(MAX_TEETH)).unwrap_or_default();
         Self {
             slots: count(parameters.installed),
@@ -251,7 +254,8 @@ impl Items {
 }
 
 impl Kind {
-    /// Draws its deviations, from a stream or none at all, and puts them into the documents; a number of the base is returned.
+    /// Draws the deviations, or zeros without a stream, and sets them in the documents. Returns the value of a number
+    /// of the base.
     fn put(&self, template: &mut Template, stream: Option<&mut Stream>) -> Option<f64> {
         let mut none = Stream::new(0, 0);
         let is_nil = stream.is_none();
@@ -285,89 +289,89 @@ impl Rows for Tolerance {
     }
 }
 
-/// What deviations do to each quantity.
+/// Result of a tolerance study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ToleranceAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
-    /// The build that computed it: equal builds on equal processors give equal bytes.
+    /// Build of the program. Equal builds on equal processors give equal bytes.
     pub build: &'static str,
-    /// Whether every drive was looked at.
+    /// True if every drive is computed.
     pub is_complete: bool,
-    /// Drives that were drawn and looked at.
+    /// Number of computed random drives.
     pub samples: u64,
-    /// Of those, drives that cannot be put together because a part is too full. They enter no quantile.
+    /// Random drives that cannot be assembled because teeth interfere with a part. They are in no quantile.
     pub interference: u64,
-    /// Of those, drives without an answer for another reason. They enter no quantile either.
+    /// Random drives without an answer for another reason. They are in no quantile.
     pub impossible: u64,
-    /// Why variants have no answer.
+    /// Reasons for missing answers.
     pub reasons: Vec<ReasonAnswer>,
-    /// The share of all drives that can be put together and keep every limit, given `require`.
+    /// Fraction of all random drives that can be assembled and meet every limit. Absent without `require`.
     #[serde(rename = "yield", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub yield_share: Option<ShareAnswer>,
-    /// Each limit, with how many drives are beyond it.
+    /// The limits, each with the number of drives that violate it.
     pub limits: Vec<ToleranceLimitAnswer>,
-    /// Each quantity with its distribution.
+    /// The quantities, each with its distribution.
     pub quantities: Vec<ToleranceQuantityAnswer>,
 }
 
-/// A limit with how many drives are beyond it.
+/// A limit with the number of drives that violate it.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ToleranceLimitAnswer {
-    /// The quantity.
+    /// Name of the quantity.
     pub quantity: &'static str,
-    /// On which side of it the quantity has to be.
+    /// Side of the limit.
     pub bound: Bound,
-    /// The limit.
+    /// Value of the limit.
     pub limit: f64,
-    /// Drives beyond it.
+    /// Drives that violate it.
     pub failed: u64,
 }
 
-/// The distribution of a quantity.
+/// Distribution of a quantity.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ToleranceQuantityAnswer {
-    /// Its name.
+    /// Name of the quantity.
     pub quantity: &'static str,
-    /// Its value without deviations; left out where that drive has no answer.
+    /// Value without deviations. Absent if that drive has no answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub nominal: Option<f64>,
-    /// Its mean.
+    /// Mean.
     pub mean: f64,
-    /// Its standard deviation.
+    /// Standard deviation.
     pub standard_deviation: f64,
-    /// The least that was drawn.
+    /// Smallest value of the sample.
     pub least: f64,
-    /// The largest that was drawn.
+    /// Largest value of the sample.
     pub largest: f64,
-    /// Its quantiles.
+    /// Quantiles.
     pub quantiles: Vec<QuantileAnswer>,
-    /// How its values are spread between the least and the largest.
+    /// Histogram from the smallest to the largest value.
     pub histogram: HistogramAnswer,
-    /// What each kind of deviation does alone, what does most first; empty where there is only one kind.
+    /// Effect of each kind of deviation alone, the largest first. Empty with a single kind.
     pub contributors: Vec<ContributorAnswer>,
 }
 
-/// Drives in bins of equal width.
+/// Histogram with bins of equal width.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct HistogramAnswer {
-    /// Where the bins meet, their ends included: one more than there are bins. A value at an edge is in the bin above it, the largest in
-    /// the last one.
+    /// Edges of the bins, one more than there are bins. A value at an edge is in the bin above it; the largest value is
+    /// in the last bin.
     pub edges: Vec<f64>,
-    /// How many drives are in each.
+    /// Number of drives in each bin.
     pub drives: Vec<u64>,
 }
 
-/// What a kind of deviation does alone.
+/// Effect of one kind of deviation alone.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ContributorAnswer {
-    /// The kind: its name in `deviations`, or a JSON pointer.
+    /// Kind of deviation: its name in `deviations`, or a JSON pointer.
     pub deviation: String,
-    /// Standard deviation of the quantity in drives that deviate in nothing else.
+    /// Standard deviation of the quantity in drives with this deviation alone.
     pub standard_deviation: f64,
-    /// Its variance over the sum of those of all kinds.
+    /// Variance as a fraction of the sum over all kinds.
     pub share: f64,
 }
 
@@ -378,7 +382,7 @@ struct Spread {
     standard_deviation: f64,
 }
 
-/// In two passes, so that no digits are lost to a large mean.
+/// Computes mean and standard deviation in two passes, so that a large mean costs no digits.
 fn spread(values: &[f64]) -> Spread {
     let count = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -387,7 +391,8 @@ fn spread(values: &[f64]) -> Spread {
 }
 
 impl HistogramAnswer {
-    /// Of a sorted sample, which is not empty: as many bins as twice the cube root of its size (Rice's rule), one where all values are equal.
+    /// Makes the histogram of a sorted sample. It has twice the cube root of its size bins (Rice's rule), or one if all
+    /// values are equal.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number, not negative")]
     fn of(sorted: &[f64]) -> Self {
         let (least, largest) = match sorted {
@@ -434,7 +439,7 @@ impl ToleranceAnswer {
         let quantities = quantities.map(|(column, quantity)| {
             let mut sorted = rows.values(column, samples.clone());
             let Spread { mean, standard_deviation } = spread(&sorted);
-            // Equal ones have equal bits.
+            // An unstable sort gives the same result, because equal values have equal bits.
             sorted.sort_unstable_by(f64::total_cmp);
             let kinds = (0..).zip(&tolerance.kinds).filter(|_| alone > 0).map(|(index, kind)| {
                 let first = 1 + tolerance.samples + index * alone;
@@ -481,7 +486,7 @@ impl ToleranceAnswer {
         2048 + self.quantities.iter().map(of_quantity).sum::<usize>()
     }
 
-    /// A row a quantity and quantile.
+    /// Returns a table with one row for each quantity and quantile.
     pub(crate) fn table(&self) -> Table<'_> {
         let mut columns = vec![Column::new("quantity", Content::Word)];
         columns.extend(["share", "value", "low", "high"].map(|name| Column::new(name, Content::Number)));

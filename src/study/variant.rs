@@ -1,4 +1,4 @@
-//! Variants of a document: what is free in it, over which values, and the document with values put in.
+//! Variants of a document: its free fields, their ranges, and the document with values filled in.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -10,42 +10,42 @@ use toothwave_calculation::no_answer::NoAnswer;
 
 use crate::ask::{beyond, escaped, fault};
 
-/// Combinations of choices at most: each is a document of its own, which is kept.
+/// Most combinations of choices. Each is a stored document.
 const MOST_FORMS: usize = 256;
 
-/// What all of them may take together: some three hundred thousand numbers.
+/// Most bytes of all these documents: some 300 000 numbers.
 const MOST_FORMS_BYTES: usize = 8 << 20;
 
-/// Fields that a form may leave out because only other kinds, shapes or laws have them: each is found by reading the whole form again, and
-/// all that there are have fewer.
+/// Most fields that a form may drop because they belong to other kinds, shapes or laws. Each costs parsing the form
+/// again. No document has so many.
 const MOST_LEFT_OUT: usize = 64;
 
-/// What is taken of memory comes in steps: a text or a list takes so much more than it has.
+/// Assumed allocation overhead of a string or a list, in bytes.
 pub(crate) const GRAIN_BYTES: usize = 16;
 
-/// What a clone's own copies take, at most, beside the one that it fills.
+/// Most bytes of a clone's private copies, in addition to the one that it fills.
 const OWN_BYTES: usize = 1 << 18;
 
 const RING_TEETH: [&str; 3] = ["drive", "ring", "teeth"];
 
-/// The values that a free field may have.
+/// Range of values of a free field.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Domain {
     /// Any number of a range, both ends included.
     Real {
-        /// Its least.
+        /// Smallest value.
         min: f64,
-        /// Its largest.
+        /// Largest value.
         max: f64,
     },
     /// Any whole number of a range, both ends included.
     Whole {
-        /// Its least.
+        /// Smallest value.
         min: f64,
-        /// Its largest.
+        /// Largest value.
         max: f64,
     },
-    /// One of several.
+    /// One of this many choices.
     OneOf(usize),
 }
 
@@ -58,7 +58,7 @@ pub(crate) struct Variable {
     choices: Vec<Tree>,
 }
 
-/// What is asked of a free field: a range, or a choice.
+/// Requested values of a free field: a range or a list.
 #[derive(Debug, Clone)]
 pub(crate) enum Asked {
     Range { min: f64, max: f64 },
@@ -69,46 +69,46 @@ pub(crate) enum Asked {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Value {
     Number(f64),
-    /// Which of the choices.
+    /// Index of the choice.
     Choice(usize),
 }
 
-/// Documents with free fields: one for each combination of choices. Clones share them, but for those that a clone has filled.
+/// Documents with free fields, one for each combination of choices. Clones share those that they have not filled.
 #[derive(Debug, Clone)]
 pub(crate) struct Template {
-    /// What the study's document calls the list of the variables.
+    /// Name of the list of variables in the study document.
     list: &'static str,
     variables: Arc<Vec<Variable>>,
     forms: Arc<Vec<Form>>,
-    /// Copies of forms that are shared, by their index, to be filled.
+    /// Private copies of shared forms, by index.
     own: BTreeMap<usize, Form>,
 }
 
 #[derive(Debug, Clone)]
 struct Form {
     tree: Tree,
-    /// Of the variables, whether this form takes it.
+    /// For each variable, true if this form has it.
     takes: Vec<bool>,
     derives_ring_teeth: bool,
 }
 
 fn too_many_forms(list: &str) -> NoAnswer {
-    let detail = format!("the choices have more than {MOST_FORMS} combinations");
+    let detail = format!("the lists have more than {MOST_FORMS} combinations. Use fewer values");
     fault(&format!("/{list}"), FieldCode::OutOfRange, detail)
 }
 
 impl Template {
-    /// The documents of a base with these free fields, of which `list` is the name in the study's document.
+    /// Makes the documents of a base with these free fields. `list` is their name in the study document.
     ///
     /// # Errors
-    /// Where a document cannot be read, whatever the values; where a range is empty, or no document takes a free field.
+    /// Fails if a document is invalid for all values, if a range is empty, or if no document has a free field.
     pub(crate) fn new(base: &Tree, free: &[(String, Asked)], list: &'static str) -> Result<Self, NoAnswer> {
         let at = |pointer: &str| format!("/{list}/{}", escaped(pointer));
         let mut paths = Vec::new();
         for (pointer, _) in free {
             let Some(path) = path(pointer) else {
                 let detail = format!(
-                    "`{pointer}` is no JSON pointer into a design document: one begins with `/`, and none leads deeper than 128 levels"
+                    "`{pointer}` is not a JSON pointer into a design document. Begin it with `/`, and use at most 128 levels"
                 );
                 return Err(fault(&at(pointer), FieldCode::UnknownField, detail));
             };
@@ -123,7 +123,7 @@ impl Template {
         for ((pointer, asked), path) in free.iter().zip(paths) {
             let has_fields = matches!(base.at(&path), Some(Tree::Object(_) | Tree::Array(_)));
             if has_fields || all_above.contains(&**pointer) {
-                let detail = format!("`{pointer}` is no value but holds fields: name one of these");
+                let detail = format!("`{pointer}` is an object or a list. Name one of its fields");
                 return Err(fault(&at(pointer), FieldCode::WrongType, detail));
             }
             let (domain, choices) = match asked {
@@ -132,26 +132,28 @@ impl Template {
             };
             match domain {
                 Domain::Real { min, max } if min > max => {
-                    let detail = format!("the range is empty: its least value {min:?} is above its largest {max:?}");
+                    let detail =
+                        format!("the range is empty: `min` {min:?} is above `max` {max:?}. Use a smaller `min`");
                     return Err(beyond(&format!("{}/min", at(pointer)), FieldCode::OutOfRange, detail, min, max));
                 }
                 Domain::Real { min, max } if !(max - min).is_finite() => {
-                    let detail =
-                        format!("the range from {min:?} to {max:?} is wider than numbers go: choose a narrower one");
+                    let detail = format!(
+                        "the range from {min:?} to {max:?} is wider than the largest number. Use a narrower one"
+                    );
                     return Err(beyond(&at(pointer), FieldCode::OutOfRange, detail, max, min));
                 }
                 Domain::OneOf(0) => {
-                    let detail = "a choice of nothing: name at least one value";
+                    let detail = "`one_of` is empty. Name at least one value";
                     return Err(fault(&format!("{}/one_of", at(pointer)), FieldCode::OutOfRange, detail));
                 }
                 _ => {}
             }
-            // Before each is compared with the others: of twelve thousand that took a second.
+            // Checked first, because the next check compares all pairs.
             if choices.len() > MOST_FORMS {
                 return Err(too_many_forms(list));
             }
             if let Some(twice) = (1..choices.len()).find(|&index| choices[..index].contains(&choices[index])) {
-                let detail = "it is one of the choices already";
+                let detail = "the value is listed twice. Remove one";
                 return Err(fault(&format!("{}/one_of/{twice}", at(pointer)), FieldCode::ConflictingFields, detail));
             }
             variables.push(Variable { pointer: pointer.clone(), path, domain, choices });
@@ -163,7 +165,7 @@ impl Template {
         let bytes = combinations.saturating_mul(template.form_bytes(base));
         if combinations > 1 && bytes > MOST_FORMS_BYTES {
             let detail = format!(
-                "each of the {combinations} combinations of choices is a document of its own: of this base they take {bytes} bytes, more than {MOST_FORMS_BYTES}"
+                "the lists have {combinations} combinations, and their documents need {bytes} bytes. Use fewer values or a shorter base, for at most {MOST_FORMS_BYTES} bytes"
             );
             return Err(fault(&format!("/{list}"), FieldCode::OutOfRange, detail));
         }
@@ -171,9 +173,9 @@ impl Template {
         for combination in 0..combinations {
             let form = template.form(base, combination, &mut left_out).map_err(|mut found| {
                 if found.code == FieldCode::MissingField {
-                    found.detail = format!("{}: neither the base has it nor `{list}`", found.detail);
+                    found.detail = format!("{}: it is neither in the base nor in `{list}`", found.detail);
                 }
-                // Beyond the end of a list, or below a value: what is put there is at fault, not what the base has.
+                // Past the end of a list, or below a value: the error is the free field's, not the base's.
                 let has_fields =
                     path(&found.pointer).is_some_and(|path| matches!(base.at(&path), Some(Tree::Object(_))));
                 let leads_on = |variable: &&Variable| {
@@ -183,7 +185,8 @@ impl Template {
                 found.pointer = match leading.filter(|_| !has_fields && found.code != FieldCode::MissingField) {
                     Some(variable) => {
                         found.code = FieldCode::UnknownField;
-                        found.detail = format!("no document of this base has such a field within `{}`", found.pointer);
+                        found.detail =
+                            format!("a document of this base has no such field within `{}`. Remove it", found.pointer);
                         at(&variable.pointer)
                     }
                     None => template.blamed(&found.pointer),
@@ -201,7 +204,7 @@ impl Template {
         let mut of_forms = vec![Vec::new(); template.forms.len()];
         for (index, variable) in template.variables.iter().enumerate() {
             let Some(form) = template.forms.iter().position(|form| form.takes[index]) else {
-                let detail = format!("no variant takes `{}`", variable.pointer);
+                let detail = format!("no variant has the field `{}`. Remove it", variable.pointer);
                 return Err(fault(&at(&variable.pointer), FieldCode::UnknownField, detail));
             };
             of_forms[form].push(index);
@@ -214,18 +217,19 @@ impl Template {
             if let Domain::Whole { min, max } = variable.domain
                 && min > max
             {
-                let detail = "the range holds no whole number";
+                let detail = "the range has no whole number. Widen it";
                 return Err(beyond(&format!("{}/min", at(&variable.pointer)), FieldCode::OutOfRange, detail, min, max));
             }
         }
-        // Until it was known which numbers are whole, any had to be: from here on each form is a variant of its own.
+        // All numbers were whole until the types were known. From here on each form is a valid variant.
         for form in Arc::make_mut(&mut template.forms) {
             form.put_least(&template.variables);
         }
         Ok(template)
     }
 
-    /// That where fields are put in the place of a value, as of one stress for all contacts, the value could have stood there too.
+    /// Checks values of the base that free fields replace, for example one stress by one for each contact. The value
+    /// must be valid too.
     fn require_possible_values_above(&self, base: &Tree) -> Result<(), NoAnswer> {
         let ring_teeth = RING_TEETH.map(String::from);
         let derives = self.forms.iter().any(|form| form.derives_ring_teeth);
@@ -234,7 +238,7 @@ impl Template {
         let value_above = |path: &&[String]| {
             let is_value = |length: &usize| match base.at(&path[..*length]) {
                 None | Some(Tree::Object(_)) => false,
-                // An entry that is there is a field of it.
+                // An existing entry of a list is a field of it.
                 Some(Tree::Array(_)) => base.at(&path[..=*length]).is_none(),
                 Some(_) => true,
             };
@@ -255,7 +259,7 @@ impl Template {
         Ok(())
     }
 
-    /// Where in the study's document that stands which a design has at a place.
+    /// Returns the place in the study document of a field of the design.
     pub(crate) fn blamed(&self, pointer: &str) -> String {
         if self.variables.iter().any(|variable| variable.pointer == pointer) {
             format!("/{}/{}", self.list, escaped(pointer))
@@ -264,7 +268,7 @@ impl Template {
         }
     }
 
-    /// Whether variants differ in what stands at a place.
+    /// True if variants differ in the field at this pointer.
     pub(crate) fn is_varied(&self, pointer: &str) -> bool {
         let derives = self.forms.iter().any(|form| form.derives_ring_teeth);
         self.variables.iter().any(|variable| variable.pointer == pointer)
@@ -273,7 +277,7 @@ impl Template {
                 && self.varies_within(&["/drive/teeth/count", "/drive/wave_generator"])
     }
 
-    /// Whether variants may differ in what stands at any of these places or within it.
+    /// True if variants may differ at one of these places or within it.
     pub(crate) fn varies_within(&self, places: &[&str]) -> bool {
         let varies = |variable: &&Variable| match variable.domain {
             Domain::Real { min, max } | Domain::Whole { min, max } => min < max,
@@ -283,7 +287,7 @@ impl Template {
         self.variables.iter().filter(varies).any(is_there)
     }
 
-    /// The variables that the form takes to which these values lead, one for each variable.
+    /// Returns the variables of the form that these values select. There is one value for each variable.
     pub(crate) fn taken(&self, values: &[Value]) -> impl Iterator<Item = &Variable> {
         let takes = &self.forms[self.form_index(values)].takes;
         self.variables.iter().zip(takes).filter(|(_, takes)| **takes).map(|(variable, _)| variable)
@@ -297,9 +301,9 @@ impl Template {
         Arc::clone(&self.variables)
     }
 
-    /// What a form takes at most: the base, and whatever is put into it.
+    /// Largest size of a form in bytes: the base and the filled fields.
     fn form_bytes(&self, base: &Tree) -> usize {
-        /// Of an object that is made for a name on the way, beside the name.
+        /// Bytes of an object that a path creates, without its name.
         const LEVEL_BYTES: usize = 96;
         let put_in = |variable: &Variable| {
             let on_the_way: usize = variable.path.iter().map(|name| LEVEL_BYTES + name.len()).sum();
@@ -308,7 +312,7 @@ impl Template {
         base.bytes() + self.variables.iter().map(put_in).sum::<usize>()
     }
 
-    /// About what the template takes in memory.
+    /// Estimated memory of the template in bytes.
     pub(crate) fn bytes(&self) -> usize {
         let takes = self.forms.iter().map(|form| GRAIN_BYTES + form.takes.len());
         self.forms_bytes() + takes.sum::<usize>() + self.variables.iter().map(Variable::bytes).sum::<usize>()
@@ -322,12 +326,13 @@ impl Template {
         self.own.values().map(|form| form.tree.bytes()).sum()
     }
 
-    /// About what its longest document takes.
+    /// Estimated bytes of its longest document.
     pub(crate) fn longest_bytes(&self) -> usize {
         self.examples().map(Tree::bytes).max().unwrap_or_default()
     }
 
-    /// The document of a combination of choices, in which everything else stands at some value, and what of the base it does not know is left out.
+    /// Makes the document of a combination of choices, with some value for each free number. Fields of the base that
+    /// this combination does not have are removed.
     fn form(
         &self,
         base: &Tree,
@@ -356,7 +361,7 @@ impl Template {
         loop {
             form.derive();
             let Err(found) = form.tree.read::<Design>() else { return Ok(form) };
-            // What another kind, shape or law has; whether one has it is known when all forms are.
+            // A field of another kind, shape or law. Whether it exists at all is known after all forms are made.
             let is_of_choice = self.variables.iter().filter(|variable| !variable.choices.is_empty()).any(|variable| {
                 let parent = variable.pointer.rsplit_once('/').map_or("", |(parent, _)| parent);
                 found.pointer.strip_prefix(parent).is_some_and(|rest| rest.starts_with('/'))
@@ -375,7 +380,7 @@ impl Template {
         }
     }
 
-    /// Which form the choices lead to.
+    /// Returns the index of the form that these choices select.
     fn form_index(&self, values: &[Value]) -> usize {
         let (mut index, mut weight) = (0, 1);
         for (variable, value) in self.variables.iter().zip(values) {
@@ -387,11 +392,11 @@ impl Template {
         index
     }
 
-    /// The document with these values, one for each variable. What the form does not take stays out.
+    /// Returns the document with these values, one for each variable. Fields that the form does not have are skipped.
     pub(crate) fn filled(&mut self, values: &[Value]) -> &Tree {
         let index = self.form_index(values);
         let form = if Arc::strong_count(&self.forms) == 1 {
-            // Nobody else has them, so that nothing is copied.
+            // Sole owner: no copy.
             &mut Arc::make_mut(&mut self.forms)[index]
         } else {
             if !self.own.contains_key(&index) && self.own_bytes() + self.forms[index].tree.bytes() > OWN_BYTES {
@@ -408,19 +413,19 @@ impl Template {
         &form.tree
     }
 
-    /// Some document of each form.
+    /// Returns one document of each form.
     pub(crate) fn examples(&self) -> impl Iterator<Item = &Tree> {
         self.forms.iter().map(|form| &form.tree)
     }
 
-    /// A document in which a free number has a value, and everything else some value.
+    /// Returns a document with this value for one free number, and some value for all other fields.
     pub(crate) fn example_at(&self, index: usize, value: f64) -> Option<Tree> {
         let mut tree = self.forms.iter().find(|form| form.takes[index])?.tree.clone();
         tree.set(&self.variables[index].path, Tree::Number(value));
         Some(tree)
     }
 
-    /// A document of each form in which every free number has the value that it is given.
+    /// Returns a document of each form, with the given values for its free numbers.
     pub(crate) fn examples_at(&self, value: impl Fn(&Variable) -> Option<f64>) -> impl Iterator<Item = Tree> {
         self.forms.iter().map(move |form| {
             let mut form = form.clone();
@@ -434,7 +439,7 @@ impl Template {
         })
     }
 
-    /// Puts the same value at a place in every form.
+    /// Sets a value at a place in every form.
     pub(crate) fn set(&mut self, place: &[String], value: &Tree) {
         self.own.clear();
         for form in Arc::make_mut(&mut self.forms) {
@@ -442,7 +447,7 @@ impl Template {
         }
     }
 
-    /// Takes away what stands at a place in every form.
+    /// Removes a place from every form.
     pub(crate) fn remove(&mut self, place: &[String]) {
         self.own.clear();
         for form in Arc::make_mut(&mut self.forms) {
@@ -451,13 +456,13 @@ impl Template {
     }
 }
 
-/// Whether a pointer leads to a place or to what it holds.
+/// True if a pointer is at a place or within it.
 fn is_within(pointer: &str, place: &str) -> bool {
     pointer.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
 impl Form {
-    /// The ring's teeth, where they are left out: one fewer than the carrier's for each lobe.
+    /// Sets the ring's teeth if the base has none: the number of teeth minus the number of lobes.
     fn derive(&mut self) {
         if !self.derives_ring_teeth {
             return;
@@ -481,7 +486,7 @@ impl Form {
         }
     }
 
-    /// Puts the least value of every free number there.
+    /// Sets every free number to its smallest value.
     fn put_least(&mut self, variables: &[Variable]) {
         for (variable, _) in variables.iter().zip(&self.takes).filter(|(_, takes)| **takes) {
             if let Domain::Real { min, .. } | Domain::Whole { min, .. } = variable.domain {
@@ -491,7 +496,8 @@ impl Form {
         self.derive();
     }
 
-    /// Finds which of these variables are whole as this form reads them: a number between two whole ones is none. All are tried at once, as there may be thousands.
+    /// Finds the variables that this form parses as whole numbers: they reject a number with a half. All are tried at
+    /// once, because there may be thousands.
     fn find_whole(&self, variables: &mut [Variable], indices: &[usize]) {
         let mut tree = self.tree.clone();
         let mut real = BTreeMap::new();
@@ -516,14 +522,14 @@ impl Form {
 }
 
 impl Variable {
-    /// About what it takes in memory.
+    /// Estimated memory in bytes.
     fn bytes(&self) -> usize {
         let path = self.path.iter().map(|name| size_of::<String>() + GRAIN_BYTES + name.len());
         let choices = self.choices.iter().map(|choice| GRAIN_BYTES + choice.bytes());
         size_of::<Self>() + GRAIN_BYTES + self.pointer.len() + path.sum::<usize>() + choices.sum::<usize>()
     }
 
-    /// The value at a share of the domain, 0 to 1; every whole number and every choice has an equal part of it.
+    /// Returns the value at a fraction of the domain, 0 to 1. Every whole number and every choice has an equal part.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of choices")]
     pub(crate) fn at_share(&self, share: f64) -> Value {
         match self.domain {
@@ -533,17 +539,17 @@ impl Variable {
         }
     }
 
-    /// Where it stands in a design.
+    /// Path of the field in a design.
     pub(crate) fn path(&self) -> &[String] {
         &self.path
     }
 
-    /// The choices, where it is one.
+    /// The choices, if it has a list.
     pub(crate) fn choices(&self) -> &[Tree] {
         &self.choices
     }
 
-    /// A value as documents spell it.
+    /// Returns a value as in documents.
     pub(crate) fn spelled(&self, value: Value) -> Tree {
         match value {
             Value::Number(number) => Tree::Number(number),

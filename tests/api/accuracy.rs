@@ -1,4 +1,4 @@
-//! How wrong and how slow each way is, held against 40 digits.
+//! Errors and solve times of each way to calculate, against 40 digits.
 
 use serde_json::{Value, json};
 
@@ -7,7 +7,7 @@ use crate::designs::{spelled_out, with};
 
 const CONTACTS: [&str; 3] = ["wave_generator", "ring", "carrier"];
 
-/// Cases of the reference with their true extremes: the paper's, a bored one and a hard one.
+/// Reads reference cases with true extremes: the paper's, a bored one and a hard one.
 fn cases() -> Vec<Value> {
     let file: Value = serde_json::from_str(include_str!("../reference/extremes.json")).unwrap();
     let cases = file["cases"].as_array().unwrap().iter().filter(|case| {
@@ -25,7 +25,7 @@ fn ways(answer: &Value) -> &Vec<Value> {
     answer["ways"].as_array().unwrap()
 }
 
-/// The largest relative error of the peaks of a sweep against 40 digits.
+/// Returns the largest relative error of the peaks of a sweep against 40 digits.
 fn true_error(sweep: &Value, case: &Value) -> f64 {
     let mut worst = 0.0_f64;
     for contact in CONTACTS {
@@ -39,7 +39,7 @@ fn true_error(sweep: &Value, case: &Value) -> f64 {
 }
 
 #[tokio::test]
-async fn the_errors_that_are_told_are_the_errors_against_40_digits() {
+async fn reported_errors_match_40_digit_reference() {
     let cases = cases();
     assert!(cases.len() >= 6, "{}", cases.len());
     for case in &cases {
@@ -56,7 +56,7 @@ async fn the_errors_that_are_told_are_the_errors_against_40_digits() {
             };
             let sweep = service.post("/v1/sweep", &with(&case["document"], "/sweep", points)).await.found();
             let (told, known) = (way["error"].as_f64().unwrap(), true_error(&sweep, case));
-            // The hardest of them has a condition of 1e-9.
+            // The hardest case has a condition of 1e-9.
             assert!((told - known).abs() <= 1e-6 * known + 2e-9, "{}: {told:e}, not {known:e}: {way}", case["name"]);
             assert_eq!(way["states"], sweep["states"]["tooth"].as_array().unwrap().len());
             seen += 1;
@@ -66,7 +66,7 @@ async fn the_errors_that_are_told_are_the_errors_against_40_digits() {
 }
 
 #[tokio::test]
-async fn the_cheapest_way_meets_the_requested_error_and_none_that_meets_it_is_faster() {
+async fn cheapest_way_is_fastest_within_requested_error() {
     for requested in [1e-2, 1e-4, 1e-8] {
         let document = with(&spelled_out(), "/accuracy", json!({ "requested_error": requested }));
         let answer = Service::new().post("/v1/accuracy", &document).await.found();
@@ -83,7 +83,7 @@ async fn the_cheapest_way_meets_the_requested_error_and_none_that_meets_it_is_fa
 }
 
 #[tokio::test]
-async fn every_form_and_law_is_tried_and_told_how_far_it_is_from_the_designs_own() {
+async fn reports_difference_of_every_model_to_own() {
     let answer = Service::new().post("/v1/accuracy", &spelled_out()).await.found();
     let models: std::collections::BTreeSet<_> = ways(&answer)
         .iter()
@@ -94,7 +94,7 @@ async fn every_form_and_law_is_tried_and_told_how_far_it_is_from_the_designs_own
     for way in ways(&answer) {
         let is_own = way["compatibility"] == "projection" && way["law"] == "linear";
         let difference = way["model_difference"].as_f64().unwrap();
-        // Whole hundredths of the force: johnson 1, palmgren by virtual work 1, linear 3, the projections 11 and 8.
+        // In hundredths of the force: johnson 1, palmgren by virtual work 1, linear 3, the projections 11 and 8.
         let expected = match (way["compatibility"].as_str().unwrap(), way["law"].as_str().unwrap()) {
             ("virtual_work", "linear") => 0.03,
             ("virtual_work", _) => 0.01,
@@ -109,16 +109,16 @@ async fn every_form_and_law_is_tried_and_told_how_far_it_is_from_the_designs_own
     assert_eq!(answer["unavailable"], json!([]));
 }
 
-/// Case 5.2 with its teeth entering under load, of which the elements say nothing.
+/// Teeth of case 5.2 enter under load, which the finite elements do not cover.
 #[tokio::test]
-async fn of_a_drive_beyond_those_that_were_calculated_no_error_of_the_model_is_told() {
+async fn omits_model_error_beyond_calculated_drives() {
     let service = Service::new();
     let case_5_2: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
     let entering = with(&case_5_2, "/model", json!({}));
-    // Narrower, so that its fingers are stiff enough.
+    // A smaller width makes its fingers stiff enough.
     let narrow = with(&with(&case_5_2, "/drive/teeth/width_mm", json!(5.0)), "/load/input_torque_nm", json!(1.0));
     let pressed = with(&narrow, "/model", json!({ "corner_contact": true }));
-    // Fingers that are held at one end take 13 % off case 5.1's largest force.
+    // Fingers held at one end reduce case 5.1's largest force by 13 %.
     let case_5_1 = with(&spelled_out(), "/model", json!({}));
     let slender = with(&case_5_1, "/parts", json!({ "carrier": { "fingers": "held_at_one_end" } }));
     for (document, expected) in [(entering, None), (pressed, Some(0.04)), (case_5_1, Some(0.01)), (slender, None)] {
@@ -130,7 +130,7 @@ async fn of_a_drive_beyond_those_that_were_calculated_no_error_of_the_model_is_t
 }
 
 #[tokio::test]
-async fn a_model_without_an_answer_is_named_with_the_reason() {
+async fn names_model_without_answer_and_its_reason() {
     let document = [
         ("/drive/ring/teeth", json!(30)),
         ("/drive/teeth/radius_mm", json!(4.0)),
@@ -147,7 +147,7 @@ async fn a_model_without_an_answer_is_named_with_the_reason() {
 }
 
 #[tokio::test]
-async fn what_is_measured_is_never_cached() {
+async fn accuracy_answers_are_never_cached() {
     let service = Service::new();
     for _ in 0..2 {
         let answer = service.post("/v1/accuracy", &spelled_out()).await;

@@ -1,4 +1,4 @@
-//! Ways to ask the service: a process of its own for each test, over real connections.
+//! Clients of the service. Each test has its own process and uses real connections.
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -15,7 +15,7 @@ use crate::serving::Process;
 pub(crate) const ENDPOINTS: [&str; 4] =
     ["/v1/geometry", "/v1/coincidence-degree", "/v1/sweep", "/v1/drawings/assembly"];
 
-/// What a test sets of the service.
+/// Service settings of a test.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
     pub(crate) max_states: u64,
@@ -26,7 +26,7 @@ pub(crate) struct Limits {
     pub(crate) max_unread_bytes: u64,
 }
 
-/// Limits that no test meets by accident; above all no test races the deadline.
+/// Generous limits. No test comes near the deadline.
 pub(crate) const LIMITS: Limits = Limits {
     max_states: 1_000_000,
     max_body_bytes: 65_536,
@@ -52,7 +52,7 @@ impl Limits {
     }
 }
 
-/// What is asked.
+/// A request.
 #[derive(Debug, Clone)]
 pub(crate) struct Question {
     method: &'static str,
@@ -66,12 +66,12 @@ impl Question {
         Self { method, path: path.into(), headers: Vec::new(), body: Vec::new() }
     }
 
-    /// A POST of these bytes as JSON.
+    /// Makes a POST request with these bytes as JSON.
     pub(crate) fn post(path: &str, body: impl Into<Vec<u8>>) -> Self {
         Self::post_as("application/json", path, body)
     }
 
-    /// A POST of these bytes as whatever they are.
+    /// Makes a POST request with these bytes and this content type.
     pub(crate) fn post_as(content_type: &str, path: &str, body: impl Into<Vec<u8>>) -> Self {
         let question = Self { body: body.into(), ..Self::of("POST", path) };
         question.with("content-type", content_type)
@@ -92,7 +92,7 @@ impl Question {
     }
 }
 
-/// What is answered.
+/// A response.
 #[derive(Debug, Clone)]
 pub(crate) struct Answer {
     pub(crate) status: u16,
@@ -109,7 +109,7 @@ impl Answer {
         serde_json::from_slice(&self.body).unwrap_or_else(|error| panic!("{error}: {:?}", self.text()))
     }
 
-    /// The header's value, empty where there is none.
+    /// Returns the header's value, or an empty string.
     pub(crate) fn header(&self, name: &str) -> &str {
         self.headers.get(name).map_or("", |value| value.to_str().unwrap())
     }
@@ -128,19 +128,19 @@ impl Answer {
         cache_status(self.header("cache-status")).contains(&"collapsed")
     }
 
-    /// Whether this very request was solved for.
+    /// True if the answer was solved for this very request.
     pub(crate) fn is_miss(&self) -> bool {
         cache_status(self.header("cache-status")).contains(&"fwd=miss") && !self.is_collapsed()
     }
 
-    /// The body of a success in JSON.
+    /// Returns the body of a success in JSON.
     pub(crate) fn found(&self) -> Value {
         assert_eq!(self.status, 200, "{}", self.text());
         assert_eq!(self.header("content-type"), "application/json");
         self.json()
     }
 
-    /// The body of a problem, which is one in every respect.
+    /// Returns the body of a problem after full checks.
     pub(crate) fn problem(&self) -> Value {
         assert_eq!(self.header("content-type"), "application/problem+json", "{}: {}", self.status, self.text());
         let problem = self.json();
@@ -164,14 +164,14 @@ impl Answer {
         problem
     }
 
-    /// The body of a problem of this kind.
+    /// Returns the body of a problem with this status and code.
     pub(crate) fn refused(&self, status: u16, code: &str) -> Value {
         let problem = self.problem();
         assert_eq!((self.status, problem["code"].as_str()), (status, Some(code)), "{problem}");
         problem
     }
 
-    /// The one field at fault in a document that is no design document.
+    /// Returns pointer, code and detail of the only field at fault.
     pub(crate) fn faulty_field(&self) -> (String, String, String) {
         let problem = self.refused(422, "invalid_document");
         let [error] = problem["errors"].as_array().unwrap().as_slice() else { panic!("not one fault: {problem}") };
@@ -204,7 +204,7 @@ impl Service {
         Self::with(LIMITS, &flags)
     }
 
-    /// Within these limits, and with further arguments.
+    /// Starts a service within these limits, with further arguments.
     pub(crate) fn with(limits: Limits, arguments: &[&str]) -> Self {
         let limits = limits.arguments();
         let limits = limits.iter().map(String::as_str);
@@ -216,7 +216,7 @@ impl Service {
         &self.0
     }
 
-    /// The process alone, which no other part of the test uses any more.
+    /// Returns the process after the last use of the service.
     pub(crate) fn into_process(self) -> Process {
         Arc::try_unwrap(self.0).unwrap()
     }
@@ -230,12 +230,12 @@ impl Service {
         tokio::task::spawn_blocking(move || ask_at(address, &question)).await.unwrap()
     }
 
-    /// Sends a design document.
+    /// Posts a design document.
     pub(crate) async fn post(&self, path: &str, document: &Value) -> Answer {
         self.ask(&Question::post(path, document.to_string())).await
     }
 
-    /// Sends a text as if it were a design document.
+    /// Posts a text as a design document.
     pub(crate) async fn post_text(&self, path: &str, text: impl Into<Vec<u8>>) -> Answer {
         self.ask(&Question::post(path, text)).await
     }
@@ -244,7 +244,7 @@ impl Service {
         self.ask(&Question::of("GET", path)).await
     }
 
-    /// The value of a series of the metrics.
+    /// Returns the value of a metric series.
     pub(crate) fn metric(&self, series: &str) -> f64 {
         let metrics = ask_at(self.address(), &Question::of("GET", "/metrics"));
         let line = metrics.text().lines().find(|line| line.starts_with(&format!("{series} ")));
@@ -252,7 +252,7 @@ impl Service {
         line.rsplit_once(' ').unwrap().1.parse().unwrap()
     }
 
-    /// Asks again until a series has this value; fails if that takes too many tries.
+    /// Reads a metric series until it has this value. Fails after too many tries.
     pub(crate) fn until(&self, series: &str, value: f64) {
         assert!((0..100_000).any(|_| self.metric(series) == value), "{series} never is {value}");
     }
@@ -276,15 +276,15 @@ impl Service {
 /// Limits under which [`endless`] computes for minutes.
 pub(crate) const ENDLESS: Limits = Limits { max_states: 100_000_000, max_unread_bytes: 1 << 40, ..LIMITS };
 
-/// A sweep that no test waits for; each number is another one.
+/// Returns a request for a sweep that runs for minutes. Each number gives another sweep.
 pub(crate) fn endless(number: u16) -> Question {
     let document = with(&shortest(), "/sweep", json!({ "samples": 10_000_000 - u64::from(number) }));
     Question::post("/v1/sweep", document.to_string())
 }
 
-/// Asks whatever listens at `address`; this thread waits for the answer.
+/// Asks the listener at `address` and blocks this thread for the answer.
 pub(crate) fn ask_at(address: SocketAddr, question: &Question) -> Answer {
-    // Far beyond any answer: so that a service that hangs fails the test instead of hanging it too.
+    // Longer than any answer takes, so that a hanging service fails the test.
     const PATIENCE: Duration = Duration::from_secs(300);
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -292,7 +292,7 @@ pub(crate) fn ask_at(address: SocketAddr, question: &Question) -> Answer {
     answer_on(stream)
 }
 
-/// The answer that comes on a connection, until it is closed.
+/// Reads the answer from a connection until it is closed.
 pub(crate) fn answer_on(mut stream: TcpStream) -> Answer {
     let mut bytes = Vec::new();
     stream.read_to_end(&mut bytes).unwrap();
@@ -309,12 +309,12 @@ pub(crate) fn answer_on(mut stream: TcpStream) -> Answer {
     let body = bytes[end + 4..].to_vec();
     let body = if headers.get("transfer-encoding").is_some() { unchunked(&body) } else { body };
     let announced = headers.get("content-length").map(|length| length.to_str().unwrap().parse::<usize>().unwrap());
-    // The answer to HEAD announces a body that does not come.
+    // A response to HEAD states a length but has no body.
     assert!(body.is_empty() || announced.is_none_or(|length| length == body.len()), "the whole body has arrived");
     Answer { status, headers, body }
 }
 
-/// A body without the lengths of its chunks (RFC 9112, section 7.1).
+/// Decodes a chunked body (RFC 9112, section 7.1).
 fn unchunked(mut chunks: &[u8]) -> Vec<u8> {
     let mut body = Vec::new();
     loop {

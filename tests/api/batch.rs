@@ -1,4 +1,4 @@
-//! Batches: a document a line, an answer a line, in order and whatever each comes to.
+//! Batches: one document and one answer for each line, in order.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -25,13 +25,13 @@ fn lines(answer: &Answer) -> Vec<Value> {
     lines
 }
 
-/// Case 5.1 with another torque for each index, so that every answer tells whose it is.
+/// Returns case 5.1 with another torque for each index, so that each answer identifies its document.
 fn variant(index: u64) -> Value {
     with(&with(&shortest(), "/model", of_the_paper()), "/load/input_torque_nm", json!(20.0 + index as f64))
 }
 
 #[tokio::test]
-async fn every_document_is_answered_in_its_place_as_it_would_be_by_itself() {
+async fn answers_each_document_as_alone() {
     let service = Service::new();
     let impossible = with(&shortest(), "/drive/teeth/radius_mm", json!(0));
     let documents =
@@ -52,21 +52,21 @@ async fn every_document_is_answered_in_its_place_as_it_would_be_by_itself() {
 }
 
 #[tokio::test]
-async fn answers_keep_the_order_of_a_thousand_documents() {
+async fn answers_keep_order_of_a_thousand_documents() {
     let documents: Vec<_> = (0..1000).map(|index| variant(index).to_string()).collect();
     let found = lines(&batch(&Service::new(), "?peaks_only=true", &documents).await);
     assert_eq!(found.len(), 1000);
     let first = found[0]["answer"]["peaks"]["ring"]["force_n"]["value"].as_f64().unwrap();
     for (index, line) in found.iter().enumerate() {
         assert_eq!(line["index"], index);
-        // Forces go with the torque.
+        // Forces are proportional to the torque.
         let force_n = line["answer"]["peaks"]["ring"]["force_n"]["value"].as_f64().unwrap();
         assert!((force_n / first / ((20.0 + index as f64) / 20.0) - 1.0).abs() < 1e-12, "{index}");
     }
 }
 
 #[tokio::test]
-async fn the_peaks_alone_are_those_of_the_whole_answer() {
+async fn peaks_only_equal_peaks_of_full_answer() {
     let service = Service::new();
     let limited = with(&shortest(), "/load/allowable_stress_mpa", json!(1500.0));
     let cam = json!({ "kind": "plain", "coefficient": 0.03 });
@@ -89,7 +89,7 @@ async fn the_peaks_alone_are_those_of_the_whole_answer() {
 }
 
 #[tokio::test]
-async fn blank_lines_are_passed_over_and_a_line_too_long_is_a_problem_of_its_own() {
+async fn skips_blank_lines_and_reports_long_line() {
     let service = Service::within(Limits { max_body_bytes: 1_000, ..LIMITS });
     let long = format!("{:2000}", variant(1).to_string());
     let documents =
@@ -102,12 +102,12 @@ async fn blank_lines_are_passed_over_and_a_line_too_long_is_a_problem_of_its_own
 }
 
 #[tokio::test]
-async fn an_empty_batch_has_the_last_line_alone() {
+async fn empty_batch_answers_last_line_only() {
     assert!(lines(&batch(&Service::new(), "", &[]).await).is_empty());
 }
 
 #[tokio::test]
-async fn what_is_no_batch_is_refused() {
+async fn rejects_body_that_is_no_batch() {
     let service = Service::new();
     for query in ["?endpoint=accuracy", "?states=false", "?peaks_only=1", "?endpoint=geometry&peaks_only=true"] {
         batch(&service, query, &[variant(0).to_string()]).await.refused(400, "invalid_query");
@@ -117,7 +117,7 @@ async fn what_is_no_batch_is_refused() {
 }
 
 #[tokio::test]
-async fn a_line_beyond_the_deadline_is_a_problem_and_the_others_are_answered() {
+async fn line_over_deadline_fails_alone() {
     let service = Service::within(Limits { deadline_ms: 400, ..ENDLESS });
     let endless = with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })).to_string();
     let found =
@@ -127,7 +127,7 @@ async fn a_line_beyond_the_deadline_is_a_problem_and_the_others_are_answered() {
 }
 
 #[test]
-fn without_a_server_a_batch_answers_the_same_lines() {
+fn command_line_batch_answers_same_lines() {
     let documents = format!("{}\n\n{{\n{}\n", variant(0), undercut());
     let mut child = Command::new(env!("CARGO_BIN_EXE_toothwave"))
         .args(["batch", "-", "--peaks-only"])
@@ -152,14 +152,14 @@ fn without_a_server_a_batch_answers_the_same_lines() {
     assert_eq!((offline, end), (online.as_slice(), &json!({ "asked": 3, "answered": 3 })));
 }
 
-/// Documents of very different length, so that slices end anywhere.
+/// Returns documents of very different lengths, so that slices end anywhere.
 fn uneven(count: u64) -> Vec<String> {
     (0..count)
         .map(|index| with(&variant(index), "/sweep", json!({ "samples": 1 + 97 * index % 2000 })).to_string())
         .collect()
 }
 
-/// The head of a batch that is sent in chunks, by a proxy or directly.
+/// Sends the head of a batch in chunks, through a proxy or directly.
 fn open(service: &Service, is_behind_proxy: bool) -> TcpStream {
     let mut stream = TcpStream::connect(service.address()).unwrap();
     let forwarded = if is_behind_proxy { "x-forwarded-for: 192.0.2.1\r\n" } else { "" };
@@ -197,7 +197,7 @@ fn line_may_arrive_in_any_pieces() {
 }
 
 #[test]
-fn lines_are_answered_while_others_are_sent() {
+fn answers_lines_while_others_arrive() {
     let service = Service::new();
     let mut stream = open(&service, false);
     send(&mut stream, &format!("{}\n", variant(0)));
@@ -206,7 +206,7 @@ fn lines_are_answered_while_others_are_sent() {
     read_until(&mut stream, "\"index\":1");
 }
 
-/// nginx passes on no more of a request once its answer has begun.
+/// nginx forwards no more of a request once its answer has begun.
 #[test]
 fn batch_behind_proxy_is_read_first() {
     let service = Service::new();
@@ -215,7 +215,7 @@ fn batch_behind_proxy_is_read_first() {
         send(&mut stream, &format!("{}\n", variant(index)));
     }
     stream.set_nonblocking(true).unwrap();
-    // Other requests are answered meanwhile, so that its answer could have begun.
+    // The service answers other requests meanwhile, so the batch's answer could have begun.
     assert_eq!(ask_at(service.address(), &Question::post("/v1/sweep", variant(7).to_string())).status, 200);
     assert!(stream.read(&mut [0; 1]).is_err(), "no byte of the answer before the end of the batch");
     stream.set_nonblocking(false).unwrap();
@@ -253,7 +253,7 @@ fn broken_batch_ends_with_its_reason() {
 }
 
 #[test]
-fn open_batch_has_last_line_when_service_stops() {
+fn open_batch_gets_last_line_at_shutdown() {
     let service = Service::with(LIMITS, &["--shutdown-ms", "500"]);
     let mut stream = open(&service, false);
     send(&mut stream, &format!("{}\n", variant(0)));
@@ -263,7 +263,7 @@ fn open_batch_has_last_line_when_service_stops() {
 }
 
 #[test]
-fn unread_batches_hold_up_nobody() {
+fn unread_batches_delay_no_one() {
     let service = Service::new();
     let _unread: Vec<_> = (0..6).map(|_| service.send(&question("", uneven(300).join("\n")))).collect();
     for index in 0..4 {

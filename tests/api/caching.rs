@@ -1,4 +1,4 @@
-//! Results are kept by what they depend on, and solved once however many ask.
+//! The cache: equal questions share a key and are solved once.
 
 use std::io::Read as _;
 use std::net::TcpStream;
@@ -14,7 +14,7 @@ fn question(path: &str) -> Question {
 }
 
 #[tokio::test]
-async fn the_first_request_is_a_miss_and_the_same_again_a_hit_with_the_same_bytes() {
+async fn second_request_hits_cache_with_same_bytes() {
     for path in ENDPOINTS {
         let service = Service::new();
         let (first, second) = (service.ask(&question(path)).await, service.ask(&question(path)).await);
@@ -28,7 +28,7 @@ async fn the_first_request_is_a_miss_and_the_same_again_a_hit_with_the_same_byte
 }
 
 #[tokio::test]
-async fn an_identical_request_is_a_cache_hit_however_it_is_spelled() {
+async fn cache_hit_ignores_spelling() {
     let service = Service::new();
     for (path, document) in ENDPOINTS.into_iter().zip([spelled_out(), undercut(), bored()]) {
         assert!(service.post(path, &document).await.is_miss());
@@ -38,7 +38,7 @@ async fn an_identical_request_is_a_cache_hit_however_it_is_spelled() {
 }
 
 #[tokio::test]
-async fn an_entity_tag_stays_the_same_from_one_service_to_the_next() {
+async fn entity_tag_is_equal_across_services() {
     for path in ENDPOINTS {
         let (one, other) = (Service::new().ask(&question(path)).await, Service::new().ask(&question(path)).await);
         assert_eq!(one.etag(), other.etag(), "{path}");
@@ -53,7 +53,7 @@ async fn cache_status_names_one_cache_first() {
 }
 
 #[tokio::test]
-async fn server_timing_says_how_long_the_solve_took_on_hits_too() {
+async fn server_timing_reports_solve_on_hits_too() {
     let service = Service::new();
     let duration = |answer: &Answer| {
         let timing = answer.header("server-timing").to_owned();
@@ -65,7 +65,7 @@ async fn server_timing_says_how_long_the_solve_took_on_hits_too() {
     assert_eq!(duration(&miss), duration(&hit), "that of the solve which made the bytes");
 }
 
-/// Every representation of a sweep.
+/// Requests every representation of a sweep.
 async fn representations(service: &Service) -> Vec<(&'static str, &'static str, Answer)> {
     let mut answers = Vec::new();
     for accept in ["application/json", "text/csv"] {
@@ -77,9 +77,9 @@ async fn representations(service: &Service) -> Vec<(&'static str, &'static str, 
     answers
 }
 
-/// Whoever kept that a sweep has too many states was told by a service of larger limits that this is so still.
+/// A client that kept "too many states" must not get 304 from a service with larger limits.
 #[tokio::test]
-async fn an_answer_that_tells_of_a_limit_has_another_entity_tag_where_that_is_another() {
+async fn entity_tag_depends_on_reported_limit() {
     let few = Service::within(Limits { max_states: 10, ..LIMITS }).ask(&question("/v1/design")).await;
     let service = Service::new();
     let again = service.ask(&question("/v1/design").with("if-none-match", few.etag())).await;
@@ -88,7 +88,7 @@ async fn an_answer_that_tells_of_a_limit_has_another_entity_tag_where_that_is_an
 }
 
 #[tokio::test]
-async fn every_representation_has_an_entity_tag_of_its_own() {
+async fn each_representation_has_own_entity_tag() {
     let service = Service::new();
     let answers = representations(&service).await;
     for (accept, coding, answer) in &answers {
@@ -121,7 +121,7 @@ async fn every_answer_varies_by_accept_and_accept_encoding() {
 }
 
 #[tokio::test]
-async fn a_compressed_body_decodes_to_the_plain_one() {
+async fn compressed_body_decodes_to_plain_one() {
     let service = Service::new();
     for path in ENDPOINTS {
         let plain = service.ask(&question(path)).await;
@@ -134,7 +134,7 @@ async fn a_compressed_body_decodes_to_the_plain_one() {
 }
 
 #[tokio::test]
-async fn an_answer_is_compressed_for_those_who_prefer_it_so() {
+async fn compresses_when_client_prefers_it() {
     let service = Service::new();
     for (accepted, is_compressed) in [
         ("gzip", true),
@@ -159,7 +159,7 @@ async fn an_answer_is_compressed_for_those_who_prefer_it_so() {
 }
 
 #[tokio::test]
-async fn a_weight_may_be_spelled_in_capitals() {
+async fn accepts_weight_in_capitals() {
     let question = question("/v1/coincidence-degree").with("accept-encoding", "gzip;Q=0");
     assert_eq!(Service::new().ask(&question).await.header("content-encoding"), "", "RFC 9110, 12.4.2: gzip is refused");
 }
@@ -187,7 +187,7 @@ async fn page_and_api_document_are_served_compressed() {
 }
 
 #[tokio::test]
-async fn a_client_that_has_the_representation_gets_304_without_a_body() {
+async fn known_representation_gets_304_without_body() {
     let service = Service::new();
     for path in ENDPOINTS {
         let first = service.ask(&question(path)).await;
@@ -204,7 +204,7 @@ async fn a_client_that_has_the_representation_gets_304_without_a_body() {
 }
 
 #[tokio::test]
-async fn a_client_that_has_something_else_gets_the_answer() {
+async fn other_entity_tag_gets_full_answer() {
     let service = Service::new();
     let json = service.ask(&question("/v1/sweep")).await;
     let other = service.post("/v1/sweep", &undercut()).await;
@@ -219,14 +219,14 @@ async fn a_client_that_has_something_else_gets_the_answer() {
 }
 
 #[tokio::test]
-async fn the_tag_alone_is_enough_where_nothing_is_kept_any_more() {
+async fn entity_tag_gets_304_without_cached_body() {
     let tag = Service::new().ask(&question("/v1/sweep")).await.etag().to_owned();
     let answer = Service::new().ask(&question("/v1/sweep").with("if-none-match", &tag)).await;
     assert_eq!(answer.status, 304, "the bytes follow from the parameters, and so does the tag");
 }
 
 #[tokio::test]
-async fn a_design_that_gets_no_answer_is_never_304() {
+async fn refused_design_is_never_304() {
     let service = Service::new();
     let tag = service.ask(&question("/v1/sweep")).await.etag().to_owned();
     for (document, code) in [
@@ -243,7 +243,7 @@ async fn a_design_that_gets_no_answer_is_never_304() {
 }
 
 #[tokio::test]
-async fn a_design_that_gets_no_answer_gets_none_again() {
+async fn refused_design_stays_refused() {
     let service = Service::new();
     let unloaded = with(&spelled_out(), "/drive/teeth/installed", json!(4));
     for _ in 0..3 {
@@ -252,7 +252,7 @@ async fn a_design_that_gets_no_answer_gets_none_again() {
 }
 
 #[tokio::test]
-async fn what_is_not_kept_is_solved_anew_to_the_same_bytes() {
+async fn uncached_answer_is_solved_again_to_same_bytes() {
     let service = Service::within(Limits { cache_max_bytes: 0, ..LIMITS });
     let (first, second) = (service.ask(&question("/v1/sweep")).await, service.ask(&question("/v1/sweep")).await);
     assert!(first.is_miss());
@@ -260,13 +260,13 @@ async fn what_is_not_kept_is_solved_anew_to_the_same_bytes() {
 }
 
 #[tokio::test]
-async fn a_cache_that_keeps_nothing_does_not_say_that_it_stored_the_answer() {
+async fn empty_cache_reports_nothing_stored() {
     let service = Service::within(Limits { cache_max_bytes: 0, ..LIMITS });
     let answer = service.ask(&question("/v1/sweep")).await;
     assert!(!answer.header("cache-status").contains("stored"), "{}", answer.header("cache-status"));
 }
 
-/// Each client spells the document its own way.
+/// Sends equal requests that are spelled differently.
 fn equal_requests(service: &Service, count: usize) -> Vec<TcpStream> {
     let document = with(&spelled_out(), "/sweep/samples", json!(200)).to_string();
     let spelled = |spaces| Question::post("/v1/sweep", format!("{document}{}", " ".repeat(spaces)));
@@ -284,13 +284,13 @@ fn equal_requests_are_computed_once() {
 }
 
 #[test]
-fn equal_requests_take_one_place_in_the_queue() {
+fn equal_requests_take_one_queue_place() {
     let service = Service::within(Limits { max_concurrent_solves: 1, ..ENDLESS });
     let occupied = service.occupied_by(1);
-    // Thirty-two may wait, and these are more.
+    // The queue holds 32 requests, and these are more.
     let mut equal = equal_requests(&service, 50);
     service.until("toothwave_solves_queued", 1.0);
-    // The first one leaves; its computation is the others' too.
+    // The first client leaves, but the others share its computation.
     drop(equal.remove(0));
     drop(occupied);
     let answers: Vec<_> = equal.into_iter().map(answer_on).collect();
@@ -298,7 +298,7 @@ fn equal_requests_take_one_place_in_the_queue() {
 }
 
 #[test]
-fn all_who_wait_for_a_failure_are_told() {
+fn all_waiting_requests_get_the_failure() {
     let service = Service::within(Limits { max_concurrent_solves: 1, ..ENDLESS });
     let occupied = service.occupied_by(1);
     let unloaded = with(&spelled_out(), "/drive/teeth/installed", json!(4)).to_string();

@@ -1,4 +1,4 @@
-//! Every code there is. Each list is built by a `match` without a wildcard, so that a new code cannot be forgotten here.
+//! All problem, field and finding codes. A `match` without a wildcard builds each list, so no new code can be missing.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -6,7 +6,7 @@ use toothwave::http::problem::ProblemCode;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::findings::FindingCode;
 
-/// Steps through an enum from its first value to its last.
+/// Lists the values of an enum from first to last.
 macro_rules! all {
     ($type:ident: $first:ident $(, $from:ident => $to:ident)* ; $last:ident) => {{
         let next = |code: $type| match code {
@@ -117,7 +117,7 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         SetBackTwice)
 }
 
-/// The words of codes, as documents spell them, in alphabetical order.
+/// Returns the words of codes, as documents spell them, in alphabetical order.
 pub(crate) fn words(codes: &[impl Serialize]) -> Vec<String> {
     let word = |code| serde_json::to_value(code).unwrap().as_str().unwrap().to_owned();
     let mut words: Vec<_> = codes.iter().map(word).collect();
@@ -125,7 +125,7 @@ pub(crate) fn words(codes: &[impl Serialize]) -> Vec<String> {
     words
 }
 
-/// The `code`s among these objects, each once, in alphabetical order.
+/// Returns the `code`s among these objects, each once, in alphabetical order.
 pub(crate) fn codes_of<'a>(objects: impl IntoIterator<Item = &'a Value>) -> Vec<String> {
     let mut codes: Vec<_> = objects.into_iter().map(|object| object["code"].as_str().unwrap().to_owned()).collect();
     codes.sort_unstable();
@@ -134,7 +134,7 @@ pub(crate) fn codes_of<'a>(objects: impl IntoIterator<Item = &'a Value>) -> Vec<
 }
 
 #[test]
-fn every_kind_of_problem_has_its_status_and_a_type_of_its_own() {
+fn every_problem_has_status_and_unique_type() {
     use toothwave::http::problem::Problem;
     let expected = |code| match code {
         ProblemCode::MalformedJson | ProblemCode::BrokenBody | ProblemCode::InvalidQuery => 400,

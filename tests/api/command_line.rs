@@ -10,7 +10,7 @@ use crate::asking::{Question, Service};
 use crate::designs::{shortest, spelled_out, undercut, with, without};
 use crate::serving::Process;
 
-/// Commands and the paths that answer the same.
+/// Commands with the paths that give the same answers.
 const COMMANDS: [(&str, &str); 3] =
     [("geometry", "/v1/geometry"), ("coincidence-degree", "/v1/coincidence-degree"), ("sweep", "/v1/sweep")];
 
@@ -18,7 +18,7 @@ fn run(arguments: &[&str], input: &[u8]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
     let command = command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
-    // A process that does not read its input has closed it, and that is its right.
+    // A process may close its input without reading it.
     let _ = child.stdin.take().unwrap().write_all(input);
     child.wait_with_output().unwrap()
 }
@@ -37,7 +37,7 @@ fn example(name: &str) -> String {
 }
 
 #[tokio::test]
-async fn json_is_the_body_that_the_service_answers_with() {
+async fn json_equals_body_of_service() {
     for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored", "ring-with-more-teeth", "balls", "flat-sided"] {
         for (command, path) in COMMANDS {
             let served = Service::new().post_text(path, std::fs::read(example(name)).unwrap()).await;
@@ -48,7 +48,7 @@ async fn json_is_the_body_that_the_service_answers_with() {
 }
 
 #[tokio::test]
-async fn a_study_is_the_one_that_the_service_answers_with() {
+async fn study_equals_that_of_service() {
     let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 9.0, "steps": 7 } });
     let study = json!({ "study": "map", "base": shortest(), "over": over, "quantities": ["undercut"] }).to_string();
     let service = Service::new();
@@ -62,7 +62,7 @@ async fn a_study_is_the_one_that_the_service_answers_with() {
 }
 
 #[tokio::test]
-async fn csv_of_a_sweep_is_the_body_that_the_service_answers_with() {
+async fn sweep_csv_equals_body_of_service() {
     let question = Question::post("/v1/sweep", std::fs::read(example("paper-5.2")).unwrap()).with("accept", "text/csv");
     let served = Service::new().ask(&question).await;
     let output = run(&["sweep", "--format", "csv", &example("paper-5.2")], b"");
@@ -70,7 +70,7 @@ async fn csv_of_a_sweep_is_the_body_that_the_service_answers_with() {
 }
 
 #[tokio::test]
-async fn csv_of_a_geometry_holds_the_points_of_its_json() {
+async fn geometry_csv_holds_points_of_json() {
     let found = Service::new().post_text("/v1/geometry", std::fs::read(example("paper-5.2")).unwrap()).await.found();
     let output = run(&["geometry", "--format", "csv", &example("paper-5.2")], b"");
     let mut csv = csv::Reader::from_reader(stdout(&output).as_bytes());
@@ -92,7 +92,7 @@ async fn csv_of_a_geometry_holds_the_points_of_its_json() {
 }
 
 #[test]
-fn csv_of_a_coincidence_degree_is_one_line() {
+fn coincidence_degree_csv_is_one_line() {
     let output = run(&["coincidence-degree", "--format", "csv", &example("paper-5.1")], b"");
     let mut csv = csv::Reader::from_reader(stdout(&output).as_bytes());
     let names: Vec<_> = csv.headers().unwrap().iter().map(str::to_owned).collect();
@@ -103,7 +103,7 @@ fn csv_of_a_coincidence_degree_is_one_line() {
 }
 
 #[test]
-fn a_table_is_what_comes_by_default_and_holds_the_main_numbers() {
+fn prints_table_of_main_numbers_by_default() {
     for (command, numbers) in [
         ("geometry", &["14", "-13", "66.000000", "6.749190"][..]),
         ("coincidence-degree", &["14.000000000000", "7 to 7", "13.846154"]),
@@ -119,13 +119,13 @@ fn a_table_is_what_comes_by_default_and_holds_the_main_numbers() {
 }
 
 #[test]
-fn a_table_tells_the_findings() {
+fn table_lists_findings() {
     let output = run(&["coincidence-degree", &example("paper-5.2")], b"");
     assert!(stdout(&output).contains("cut away by their own envelope"), "{}", stdout(&output));
 }
 
 #[test]
-fn a_dash_reads_standard_input() {
+fn dash_reads_standard_input() {
     for (command, _) in COMMANDS {
         let from_file = run(&[command, &example("paper-5.2"), "--format", "json"], b"");
         let from_input = run(&[command, "-", "--format", "json"], &std::fs::read(example("paper-5.2")).unwrap());
@@ -133,7 +133,7 @@ fn a_dash_reads_standard_input() {
     }
 }
 
-/// Documents that get no answer, of each kind.
+/// Returns documents that get no answer, of each kind.
 fn bad_documents() -> Vec<String> {
     vec![
         String::new(),
@@ -150,14 +150,14 @@ fn bad_documents() -> Vec<String> {
 }
 
 #[tokio::test]
-async fn bad_input_ends_with_status_2_and_the_details_that_the_service_gives() {
+async fn bad_input_exits_2_with_details_of_service() {
     for document in bad_documents() {
         let problem = Service::new().post_text("/v1/sweep", document.clone()).await.problem();
         for format in ["json", "csv", "table"] {
             let output = run(&["sweep", "-", "--format", format], document.as_bytes());
             assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{document}");
             let errors: Vec<_> = problem["errors"].as_array().into_iter().flatten().collect();
-            // Of several errors the service's detail is but their number.
+            // If there are several errors, the service's detail is only their number.
             let detail = problem[if errors.len() > 1 { "title" } else { "detail" }].as_str().unwrap();
             assert!(stderr(&output).contains(detail), "{problem} is not\n{}", stderr(&output));
             assert!(!stderr(&output).contains("`errors`"), "{}", stderr(&output));
@@ -172,7 +172,7 @@ async fn bad_input_ends_with_status_2_and_the_details_that_the_service_gives() {
 }
 
 #[test]
-fn a_file_that_cannot_be_read_ends_with_status_2_and_its_name() {
+fn unreadable_file_exits_2_with_its_name() {
     for file in ["/nowhere/at/all.json", env!("CARGO_MANIFEST_DIR")] {
         let output = run(&["sweep", file], b"");
         assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
@@ -181,7 +181,7 @@ fn a_file_that_cannot_be_read_ends_with_status_2_and_its_name() {
 }
 
 #[test]
-fn a_command_that_is_misspelled_ends_with_status_2() {
+fn misspelled_command_exits_2() {
     for arguments in [
         &["swep"][..],
         &["sweep"],
@@ -209,7 +209,7 @@ fn removed_commands_name_their_replacement() {
 }
 
 #[test]
-fn without_a_server_no_limit_but_the_documents_own_applies() {
+fn only_the_documents_limits_apply() {
     let many = with(&undercut(), "/sweep", json!({ "samples": 250_000 })).to_string();
     let output = run(&["sweep", "-", "--format", "table"], many.as_bytes());
     assert!(stdout(&output).contains("coincidence degree"));
@@ -218,7 +218,7 @@ fn without_a_server_no_limit_but_the_documents_own_applies() {
 }
 
 #[test]
-fn what_is_too_much_is_too_much_for_the_command_line_and_for_no_setting() {
+fn rejects_too_much_without_naming_a_setting() {
     let states = with(&undercut(), "/sweep", json!({ "samples": 10_000_000 }));
     let points = json!({ "chord_tolerance_mm": 1e-6, "extent": "full" });
     let points =
@@ -249,18 +249,18 @@ fn version_is_the_solvers() {
 }
 
 #[test]
-fn health_is_well_where_the_service_is() {
+fn health_succeeds_for_running_service() {
     let process = Process::started(&["serve"]);
     let output = run(&["health", "--address", &process.address.to_string()], b"");
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    // What listens everywhere is asked here, and what is said by a variable need not be said again.
+    // A wildcard address is asked on this host, and the environment variable sets the address too.
     let everywhere = format!("0.0.0.0:{}", process.address.port());
     let mut command = Command::new(env!("CARGO_BIN_EXE_toothwave"));
     assert!(command.arg("health").env("TOOTHWAVE_LISTEN", everywhere).status().unwrap().success());
 }
 
 #[test]
-fn health_is_not_well_where_nothing_listens_or_something_else_does() {
+fn health_fails_without_toothwave_service() {
     let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let output = run(&["health", "--address", &closed.to_string()], b"");
     assert!(!output.status.success());
@@ -269,16 +269,16 @@ fn health_is_not_well_where_nothing_listens_or_something_else_does() {
     let address = other.local_addr().unwrap().to_string();
     let answering = std::thread::spawn(move || {
         let (mut stream, _) = other.accept().unwrap();
-        // The asker may be gone before it has heard everything.
+        // The client may close before it has read everything.
         let _ = stream.write_all(b"HTTP/1.1 503 Service Unavailable\r\n\r\n");
     });
     assert!(!run(&["health", "--address", &address], b"").status.success());
     answering.join().unwrap();
 }
 
-/// Who checks somebody else's document reads what is wrong with it, and is not shown what that one likes.
+/// Text of a foreign document must not control the reader's terminal.
 #[test]
-fn what_a_document_holds_for_a_terminal_is_spelled_out() {
+fn escapes_control_characters_for_terminal() {
     let document = r#"{ "drive": { "\u001b[2J\u009b31m\u0007good\n": 1 } }"#;
     let output = run(&["sweep", "-"], document.as_bytes());
     assert!(!output.status.success());

@@ -1,11 +1,11 @@
-//! Contact that is real: Palmgren's law, clearances, wind-up, torque capacity, sweeps to a tolerance.
+//! Contact: Palmgren's law, clearances, wind-up, torque capacity, tolerance sweeps.
 
 use serde_json::{Value, json};
 
 use crate::asking::Service;
 use crate::designs::{bored, shortest, spelled_out, undercut, with};
 
-/// Case 5.1 by virtual work and Palmgren's law, with a gap at the ring's normal.
+/// Returns case 5.1 by virtual work and Palmgren's law, with a gap at the ring's normal.
 fn palmgren(ring_um: f64) -> Value {
     let model = json!({
         "compatibility": "virtual_work",
@@ -24,8 +24,9 @@ fn codes(answer: &Value) -> Vec<&str> {
 }
 
 #[tokio::test]
-async fn gaps_at_the_ring_raise_the_peak_and_leave_fewer_teeth_loaded() {
-    // Two independent calculations; the means are over a finer sweep than 50 intervals, where a tooth on the minor axis counts for none.
+async fn ring_gaps_raise_peak_and_unload_teeth() {
+    // Known from two independent calculations. The mean needs a sweep finer than 50 intervals, because a tooth on the
+    // minor axis counts as unloaded.
     let known = [(0.0, 1395.05, 7.00), (5.0, 1640.15, 5.31), (10.0, 1837.15, 4.60), (20.0, 2169.7, 3.89)];
     for (ring_um, peak_n, loaded) in known {
         let document = with(&palmgren(ring_um), "/sweep", json!({ "samples": 2000, "wind_up": true }));
@@ -42,7 +43,7 @@ async fn gaps_at_the_ring_raise_the_peak_and_leave_fewer_teeth_loaded() {
 }
 
 #[tokio::test]
-async fn with_clearance_the_states_say_which_teeth_carry_load() {
+async fn states_with_clearance_mark_loaded_teeth() {
     let answer = Service::new().post("/v1/sweep", &palmgren(10.0)).await.found();
     let states = &answer["states"];
     let forces = numbers(&states["force_ring_n"]);
@@ -54,7 +55,7 @@ async fn with_clearance_the_states_say_which_teeth_carry_load() {
 }
 
 #[tokio::test]
-async fn wind_up_is_told_when_asked_for_and_the_linear_law_then_says_that_it_is_too_stiff() {
+async fn reports_wind_up_and_too_stiff_linear_law() {
     let asked = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
     let linear = Service::new().post("/v1/sweep", &asked).await.found();
     assert_eq!(codes(&linear), ["linear_law_too_stiff"]);
@@ -70,7 +71,7 @@ async fn wind_up_is_told_when_asked_for_and_the_linear_law_then_says_that_it_is_
 }
 
 #[tokio::test]
-async fn output_torque_over_output_rotation_is_the_torsional_stiffness_of_a_linear_law() {
+async fn linear_stiffness_is_torque_over_rotation() {
     let asked = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
     let answer = Service::new().post("/v1/sweep", &asked).await.found();
     let wind_up_deg = numbers(&answer["wind_up"]["wind_up_deg"]);
@@ -85,7 +86,7 @@ async fn output_torque_over_output_rotation_is_the_torsional_stiffness_of_a_line
 }
 
 #[tokio::test]
-async fn at_its_capacity_the_limiting_contact_bears_just_the_allowable_stress() {
+async fn limiting_contact_bears_allowable_stress_at_capacity() {
     for base in [spelled_out(), palmgren(10.0)] {
         let asked = with(&base, "/load", json!({ "input_torque_nm": 20.0, "allowable_stress_mpa": 1500.0 }));
         let capacity = Service::new().post("/v1/sweep", &asked).await.found()["torque_capacity"].clone();
@@ -102,9 +103,9 @@ async fn at_its_capacity_the_limiting_contact_bears_just_the_allowable_stress() 
     }
 }
 
-/// Soft teeth that the wave generator moves past before a contact reaches the higher stress.
+/// Teeth are soft. The wave generator moves past them before a contact reaches the higher stress.
 #[tokio::test]
-async fn a_capacity_that_no_contact_limits_says_so() {
+async fn reports_capacity_that_no_contact_limits() {
     let soft = json!({ "youngs_modulus_gpa": 3.5, "poissons_ratio": 0.4 });
     let service = Service::new();
     let mut torques_nm = Vec::new();
@@ -127,9 +128,9 @@ async fn a_capacity_that_no_contact_limits_says_so() {
     assert!(torques_nm[0] < torques_nm[1], "{torques_nm:?}");
 }
 
-/// Soft teeth in a soft ring: at some input angles Johnson's law ends before a contact reaches its stress, but under more torque than bears the others.
+/// Johnson's law ends at some input angles before a contact reaches its stress, but above the capacity of others.
 #[tokio::test]
-async fn a_capacity_within_johnsons_law_is_told_though_the_law_ends_before_a_stress_at_other_input_angles() {
+async fn reports_capacity_within_johnsons_law() {
     let material =
         |gpa: f64, poissons_ratio: f64| json!({ "youngs_modulus_gpa": gpa, "poissons_ratio": poissons_ratio });
     let soft = |load: Value, sweep: &Value| {
@@ -156,7 +157,7 @@ async fn a_capacity_within_johnsons_law_is_told_though_the_law_ends_before_a_str
         let stress_mpa = there["peaks"]["wave_generator"]["stress_mpa"]["value"].as_f64().unwrap();
         assert!((stress_mpa / 541.5 - 1.0).abs() < tolerance, "{torque_nm} N·m, {stress_mpa} MPa");
     }
-    // Where the law ends before any stress is reached there is no capacity, and the refusal says that it is about that, and under which torque.
+    // If the law ends before a contact reaches its stress, the refusal names the stress and the torque at that end.
     let sweep = json!({ "samples": 7 });
     let beyond = soft(json!({ "input_torque_nm": 0.01, "allowable_stress_mpa": 700.0 }), &sweep);
     let problem = service.post("/v1/sweep", &beyond).await.refused(422, "impossible_design");
@@ -171,7 +172,7 @@ async fn a_capacity_within_johnsons_law_is_told_though_the_law_ends_before_a_str
 }
 
 #[tokio::test]
-async fn a_clearance_that_projection_would_turn_into_load_is_refused() {
+async fn rejects_clearance_that_projection_turns_into_load() {
     let more_ring_teeth = [("/drive/ring/teeth", json!(30)), ("/drive/teeth/radius_mm", json!(4.0))]
         .into_iter()
         .fold(spelled_out(), |document, (pointer, value)| with(&document, pointer, value));
@@ -183,13 +184,13 @@ async fn a_clearance_that_projection_would_turn_into_load_is_refused() {
     let problem = refused.refused(422, "impossible_design");
     assert_eq!(problem["errors"][0]["pointer"], "/parts/carrier/clearance_um");
     assert_eq!(problem["errors"][0]["code"], "clearance_not_monotone");
-    // With fewer ring teeth it weighs the same gap positively, and virtual work weighs every gap so.
+    // Projection weighs the gap positively with fewer ring teeth, and virtual work always does.
     Service::new().post("/v1/sweep", &gap(&spelled_out(), "projection")).await.found();
     Service::new().post("/v1/sweep", &gap(&more_ring_teeth, "virtual_work")).await.found();
 }
 
 #[tokio::test]
-async fn palmgrens_law_for_other_materials_than_steel_is_a_finding() {
+async fn palmgrens_law_beyond_steel_is_a_finding() {
     let brass = with(&palmgren(0.0), "/materials/carrier", json!({ "youngs_modulus_gpa": 100.0 }));
     let answer = Service::new().post("/v1/sweep", &brass).await.found();
     assert_eq!(codes(&answer), ["palmgren_beyond_steel"]);
@@ -197,18 +198,18 @@ async fn palmgrens_law_for_other_materials_than_steel_is_a_finding() {
 }
 
 #[tokio::test]
-async fn samples_and_a_tolerance_exclude_each_other() {
+async fn samples_and_tolerance_exclude_each_other() {
     let both = with(&spelled_out(), "/sweep", json!({ "samples": 50, "tolerance": 1e-6 }));
     let (at, code, _) = Service::new().post("/v1/sweep", &both).await.faulty_field();
     assert_eq!((at.as_str(), code.as_str()), ("/sweep", "conflicting_fields"));
 }
 
 #[tokio::test]
-async fn a_sweep_to_a_tolerance_stands_on_both_sides_of_the_jump() {
+async fn tolerance_sweep_has_both_sides_of_jump() {
     let document: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
     let answer =
         Service::new().post("/v1/sweep", &with(&document, "/sweep", json!({ "tolerance": 1e-9 }))).await.found();
-    // 40 digits of it are in tests/reference/extremes.json: it stands just before a tooth enters.
+    // The peak is just before a tooth enters. tests/reference/extremes.json has 40 digits of it.
     let peak = &answer["peaks"]["wave_generator"]["force_n"];
     assert!((peak["value"].as_f64().unwrap() - 525.554_176_523).abs() < 1e-6, "{peak}");
     let entry_deg = peak["input_angle_deg"].as_f64().unwrap();
@@ -219,7 +220,7 @@ async fn a_sweep_to_a_tolerance_stands_on_both_sides_of_the_jump() {
 }
 
 #[tokio::test]
-async fn a_tolerance_that_takes_too_many_states_is_refused_with_the_limit() {
+async fn tolerance_with_too_many_states_is_refused() {
     let limits = crate::asking::LIMITS;
     let few = crate::asking::Limits { max_states: 100, ..limits };
     let fine = with(&spelled_out(), "/sweep", json!({ "tolerance": 1e-9 }));
@@ -229,7 +230,7 @@ async fn a_tolerance_that_takes_too_many_states_is_refused_with_the_limit() {
 }
 
 #[tokio::test]
-async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_design_is_one_of_those_measured() {
+async fn sweep_reports_model_error_and_its_range() {
     let service = Service::new();
     let told = async |document: &Value| service.post("/v1/sweep", document).await.found()["model_error"].clone();
     let stiff = told(&shortest()).await;
@@ -245,23 +246,23 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
         "has_pointed_tips": false
     });
     assert_eq!(stiff["measured"]["case"], case);
-    // The paper's model errs by more, where a gap is given by far more.
+    // The paper's model has a larger error, with a gap a far larger one.
     let paper = told(&spelled_out()).await;
     assert_eq!(paper["measured"]["force"], json!({ "low": 0.01, "high": 0.08 }));
     let gap = told(&with(&spelled_out(), "/parts", json!({ "ring": { "clearance_um": 12.0 } }))).await;
     assert_eq!(gap["measured"]["case"]["has_gaps"], true);
     assert!(gap["measured"]["force"]["high"].as_f64().unwrap() > 0.5);
-    // What was measured of another law than Johnson's is that of three drives.
+    // Laws other than Johnson's were measured on three drives only.
     assert_eq!((&paper["is_within"], &paper["beyond"]), (&json!(false), &json!(["law"])));
     assert_eq!((&gap["is_within"], &gap["beyond"]), (&json!(false), &json!(["law", "gap"])));
     let pointed = told(&undercut()).await;
     assert_eq!(pointed["measured"]["case"]["has_pointed_tips"], true);
     assert_eq!(pointed["measured"]["case"]["ring_teeth_bend"], true);
     assert_eq!(pointed["measured"]["force"], json!({ "low": -0.01, "high": 0.0 }));
-    // Its carrier's fingers are a millimetre and a half high; the elastic bodies had none.
+    // The carrier's fingers are 1.5 mm high, and the elastic bodies had none.
     assert_eq!(pointed["beyond"], json!(["entry_under_load", "soft_backing"]));
     assert_eq!(pointed["held"]["case"], "slender_fingers");
-    // Where its slots run into each other there is no finger to estimate.
+    // If slots run into each other, there is no finger to estimate.
     let thick = with(&shortest(), "/drive/teeth/radius_mm", json!(6.7));
     let open = with(&thick, "/parts", json!({ "carrier": { "inner_radius_mm": 58.5, "outer_radius_mm": 61.0 } }));
     assert_eq!(told(&open).await["beyond"], json!(["soft_backing"]));
@@ -278,9 +279,9 @@ async fn a_sweep_says_how_far_its_model_is_off_elastic_bodies_and_whether_this_d
     assert_eq!(stiff["range"]["lobes"], 2);
 }
 
-/// Whatever law is named.
+/// These defaults hold under every contact law.
 #[tokio::test]
-async fn by_default_pointed_tips_bend_and_gaps_move_on() {
+async fn default_refinements_follow_from_tips_and_gaps() {
     let service = Service::new();
     let solved = async |drive: &Value, model: Value, ring_um: f64| {
         let document = with(&with(drive, "/model", model), "/parts", json!({ "ring": { "clearance_um": ring_um } }));
@@ -299,11 +300,11 @@ async fn by_default_pointed_tips_bend_and_gaps_move_on() {
     assert_ne!(solved(&pointed, json!({}), 0.0).await.0, solved(&pointed, listed(json!("none")), 0.0).await.0);
     let moves = json!(["wave_generator_moves"]);
     assert_ne!(solved(&natural, listed(moves), 10.0).await.0, solved(&natural, json!({}), 10.0).await.0);
-    // Who never asked for it is told how to do without.
+    // The default refinement's refusal says how to turn it off.
     let wide =
         |choice: Value| with(&with(&bored(), "/model", choice), "/parts", json!({ "ring": { "clearance_um": 300.0 } }));
     let problem = service.post("/v1/sweep", &wide(json!({}))).await.refused(422, "impossible_design");
-    let advice = "or leave `wave_generator_moves` out of `model.refinements`";
+    let advice = "or remove `wave_generator_moves` from `model.refinements`";
     assert!(problem["detail"].as_str().unwrap().ends_with(advice), "{problem}");
     service.post("/v1/sweep", &wide(json!({ "refinements": ["ring_teeth_bend"] }))).await.found();
     let refused = json!({ "compatibility": "projection", "refinements": ["wave_generator_moves"] });
@@ -311,9 +312,9 @@ async fn by_default_pointed_tips_bend_and_gaps_move_on() {
     assert_eq!(problem["errors"][0]["pointer"], "/model/refinements");
 }
 
-/// Loads of teeth that meet the corner of a tip run on from nothing; the teeth are listed from the valley on, and say of no stress at the ring.
+/// Loads at tip corners start from zero. Teeth are listed from the valley, without a stress at the ring.
 #[tokio::test]
-async fn teeth_meet_the_corners_of_pointed_tips_where_that_is_chosen() {
+async fn teeth_meet_tip_corners_if_chosen() {
     let service = Service::new();
     let sweep = async |model: Value| service.post("/v1/sweep", &with(&undercut(), "/model", model)).await.found();
     let (rigid, pressed) = (sweep(json!({})).await, sweep(json!({ "corner_contact": true })).await);
@@ -339,9 +340,9 @@ async fn teeth_meet_the_corners_of_pointed_tips_where_that_is_chosen() {
     assert_eq!((&error["pointer"], &error["code"]), (&json!("/model/corner_contact"), &json!("conflicting_fields")));
 }
 
-/// Forces, stresses and what is kept of them follow the designer's carrier.
+/// Forces, stresses and cache keys follow the designer's carrier.
 #[tokio::test]
-async fn flat_sided_teeth_are_borne_by_the_carrier_of_the_document_and_others_do_not_ask_for_it() {
+async fn document_carrier_bears_flat_sided_teeth_only() {
     let flats =
         json!({ "shape": "flat_sided", "count": 28, "radius_mm": 5.0, "width_mm": 15.0, "flat_length_mm": 4.0 });
     let flat_sided = with(&shortest(), "/drive/teeth", flats);

@@ -1,8 +1,8 @@
-//! Design documents, and ways to change and to spell them.
+//! Design documents, with functions that change and spell them.
 
 use serde_json::{Value, json};
 
-/// The document as it stands in the contract.
+/// The documented design document.
 pub(crate) const CONTRACT: &str = r#"{
   "drive": {
     "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 },
@@ -19,12 +19,12 @@ pub(crate) const CONTRACT: &str = r#"{
   "profile": { "chord_tolerance_mm": 0.001, "extent": "tooth" }
 }"#;
 
-/// The paper's model of load sharing, which a document has to name.
+/// Returns the paper's load sharing model, which a document must name.
 pub(crate) fn of_the_paper() -> Value {
     json!({ "compatibility": "projection", "stiffness": { "law": "linear" } })
 }
 
-/// The paper's case 5.1 by the paper's model, every other field spelled out as it is by default.
+/// Returns the paper's case 5.1 under the paper's model, with every other default written out.
 pub(crate) fn spelled_out() -> Value {
     let steel = json!({ "youngs_modulus_gpa": 210.0, "poissons_ratio": 0.3 });
     json!({
@@ -41,12 +41,12 @@ pub(crate) fn spelled_out() -> Value {
     })
 }
 
-/// The same with every default spelled out, the model's too but for its law: left out, that is what holds best for the drive at hand.
+/// Returns case 5.1 with every default written out except the law. The default law follows from the drive.
 pub(crate) fn defaults_spelled_out() -> Value {
     with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work" }))
 }
 
-/// The paper's case 5.1 with nothing said that need not be said.
+/// Returns the paper's case 5.1 with required fields only.
 pub(crate) fn shortest() -> Value {
     json!({
         "drive": {
@@ -58,7 +58,7 @@ pub(crate) fn shortest() -> Value {
     })
 }
 
-/// The paper's case 5.2, undercut.
+/// Returns the paper's case 5.2, undercut.
 pub(crate) fn undercut() -> Value {
     json!({
         "drive": {
@@ -70,12 +70,12 @@ pub(crate) fn undercut() -> Value {
     })
 }
 
-/// The same, bored as for the paper's figures 20 to 25.
+/// Returns case 5.2 with the bore of the paper's figures 20 to 25.
 pub(crate) fn bored() -> Value {
     with(&undercut(), "/drive/ring/tip_radius_mm", json!(52.8227))
 }
 
-/// A drive with an eccentric circle, one lobe.
+/// Returns a drive with an eccentric circle, one lobe.
 pub(crate) fn eccentric() -> Value {
     json!({
         "drive": {
@@ -87,13 +87,13 @@ pub(crate) fn eccentric() -> Value {
     })
 }
 
-/// Everything spelled out, with fixed stiffnesses and a bore: each number that a document can hold at once.
+/// Returns a document with every number that it can hold at once, with fixed stiffnesses and a bore.
 pub(crate) fn every_number() -> Value {
     let document = with(&spelled_out(), "/model/stiffness", fixed(4e5, 5e5, 3e5));
     with(&document, "/drive/ring/tip_radius_mm", json!(66.5))
 }
 
-/// The law of fixed stiffnesses.
+/// Returns a law of fixed stiffnesses.
 pub(crate) fn fixed(wave_generator: f64, ring: f64, carrier: f64) -> Value {
     json!({
         "law": "fixed",
@@ -107,7 +107,7 @@ fn split(pointer: &str) -> (&str, &str) {
     pointer.rsplit_once('/').expect("a pointer to a field")
 }
 
-/// The document with the field or the entry set; the object or the list that holds it is there already.
+/// Returns the document with a field or entry set. Its parent must exist.
 pub(crate) fn with(document: &Value, pointer: &str, value: Value) -> Value {
     if pointer.is_empty() {
         return value;
@@ -123,7 +123,7 @@ pub(crate) fn with(document: &Value, pointer: &str, value: Value) -> Value {
     document
 }
 
-/// The document without the field, which is there.
+/// Returns the document without a field, which must exist.
 pub(crate) fn without(document: &Value, pointer: &str) -> Value {
     let mut document = document.clone();
     let (object, field) = split(pointer);
@@ -139,7 +139,7 @@ fn visit<'a>(value: &'a Value, pointer: &str, each: &mut impl FnMut(&str, &'a Va
     }
 }
 
-/// Pointers to all values that are of a kind.
+/// Returns pointers to all values that match.
 pub(crate) fn pointers(document: &Value, is_meant: impl Fn(&Value) -> bool) -> Vec<String> {
     let mut pointers = Vec::new();
     visit(document, "", &mut |pointer, value| {
@@ -150,12 +150,12 @@ pub(crate) fn pointers(document: &Value, is_meant: impl Fn(&Value) -> bool) -> V
     pointers
 }
 
-/// How a document is written as text.
+/// Options for writing a document as text.
 #[derive(Clone, Copy, Default)]
 struct Spelling<'a> {
-    /// Whether the fields of every object stand in the opposite order.
+    /// True if the fields of every object are in reverse order.
     is_reversed: bool,
-    /// The field that stands there twice.
+    /// Pointer to the duplicated field.
     twice: Option<&'a str>,
 }
 
@@ -177,12 +177,12 @@ impl Spelling<'_> {
     }
 }
 
-/// The document as text with the fields of every object in the opposite order.
+/// Writes the document with the fields of every object in reverse order.
 pub(crate) fn in_reverse(document: &Value) -> String {
     Spelling { is_reversed: true, ..Spelling::default() }.text(document, "")
 }
 
-/// The document as text with one field twice.
+/// Writes the document with one field twice.
 pub(crate) fn with_twice(document: &Value, twice: &str) -> String {
     Spelling { twice: Some(twice), ..Spelling::default() }.text(document, "")
 }

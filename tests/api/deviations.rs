@@ -1,11 +1,11 @@
-//! Single items of the parts as they came out.
+//! Deviations of single items.
 
 use serde_json::{Value, json};
 
 use crate::asking::{LIMITS, Limits, Question, Service};
 use crate::designs::{spelled_out, with};
 
-/// Case 5.1 with clearances that cover what deviates by a few micrometres.
+/// Returns case 5.1 with clearances that cover deviations of a few micrometres.
 fn cleared() -> Value {
     let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "palmgren" } });
     let document = with(&spelled_out(), "/model", model);
@@ -18,12 +18,12 @@ fn with_deviations(deviations: Value) -> Value {
     with(&cleared(), "/deviations", deviations)
 }
 
-/// A list of zeros but for one item.
+/// Returns a list of zeros except for one item.
 fn one(items: usize, item: usize, value: f64) -> Vec<f64> {
     (0..items).map(|other| if other == item { value } else { 0.0 }).collect()
 }
 
-/// Deviations of every kind.
+/// Returns deviations of every kind.
 fn every_kind() -> Value {
     json!({
         "tooth_radius_um": one(28, 3, 1.0), "slot_angle_arcsec": one(28, 4, 5.0), "slot_wall_um": one(28, 5, 1.0),
@@ -34,7 +34,7 @@ fn every_kind() -> Value {
     })
 }
 
-/// A document with a measured ring and a cam off its axis.
+/// Returns a document with a measured ring and a cam off its axis.
 pub(crate) fn deviating() -> Value {
     with_deviations(json!({ "ring_space_um": one(26, 6, 2.0), "wave_generator_runout": { "amount_um": 2.0 } }))
 }
@@ -48,10 +48,10 @@ fn numbers(column: &Value) -> Vec<f64> {
 }
 
 #[tokio::test]
-async fn with_deviations_all_zones_are_listed_by_slot_over_the_whole_sweep() {
+async fn deviations_list_all_zones_by_slot() {
     let nominal = swept(&cleared()).await;
     assert!(nominal.get("sweep_period_deg").is_none() && nominal["states"].get("lobe").is_none());
-    // Load periods: one for the cam, as many as slots or ring spaces with it, half of them without (docs/theory.md section 4.8).
+    // Load periods: one for the cam; with it as many as slots or ring spaces, else half (docs/explanation/theory.md section 4.8).
     for (deviations, periods) in [
         (json!({ "wave_generator_runout": { "amount_um": 2.0 } }), 1.0),
         (json!({ "slot_wall_um": one(28, 5, 1.0) }), 14.0),
@@ -67,7 +67,7 @@ async fn with_deviations_all_zones_are_listed_by_slot_over_the_whole_sweep() {
         let angles = numbers(&states["input_angle_deg"]);
         assert_eq!(angles.last(), answer["sweep_period_deg"].as_f64().as_ref());
         assert_eq!(numbers(&answer["wind_up"]["input_angle_deg"]).len() as f64, 4.0 * periods + 1.0);
-        // Seven teeth of either zone.
+        // Each zone has seven teeth.
         assert_eq!(angles.iter().filter(|&&angle| angle == 0.0).count(), 14);
         assert!(numbers(&states["tooth"]).iter().all(|&slot| slot < 28.0));
         let lobes = numbers(&states["lobe"]);
@@ -81,14 +81,14 @@ async fn with_deviations_all_zones_are_listed_by_slot_over_the_whole_sweep() {
         let error_deg = answer["wind_up"]["unloaded_transmission_error_peak_to_peak_deg"].as_f64().unwrap();
         assert!((14.0 * error_deg / range(&unloaded) - 1.0).abs() < 1e-12);
         assert!(answer["checks"]["period_closure_residual"].as_f64().unwrap() < 1e-11);
-        // Unlike lobes no longer balance each other.
+        // Unlike lobes do not balance each other.
         let aside = numbers(&answer["radial_force_n"]["value"]);
         assert!(aside.iter().any(|&force_n| force_n > 0.1), "{deviations}");
     }
 }
 
 #[tokio::test]
-async fn without_gaps_nothing_is_said_of_the_wind_up_without_load() {
+async fn omits_unloaded_wind_up_without_gaps() {
     let document = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
     let wind_up = swept(&document).await["wind_up"].clone();
     assert!(wind_up.get("unloaded_wind_up_deg").is_none(), "{wind_up}");
@@ -96,7 +96,7 @@ async fn without_gaps_nothing_is_said_of_the_wind_up_without_load() {
 }
 
 #[tokio::test]
-async fn geometry_has_ratios_and_torques_with_any_member_fixed() {
+async fn geometry_has_ratios_for_each_fixed_member() {
     let members = Service::new().post("/v1/geometry", &spelled_out()).await.found()["members"].clone();
     assert_eq!(
         members,
@@ -109,8 +109,8 @@ async fn geometry_has_ratios_and_torques_with_any_member_fixed() {
 }
 
 #[tokio::test]
-async fn each_number_of_the_deviations_moves_an_answer() {
-    // One interval of each of the 364 load periods is enough to see it.
+async fn each_deviation_changes_an_answer() {
+    // One interval in each of the 364 load periods shows the difference.
     let document = with(&with_deviations(every_kind()), "/sweep/samples", json!(1));
     let found = async |document: &Value| {
         let answer = swept(document).await;
@@ -136,7 +136,7 @@ async fn each_number_of_the_deviations_moves_an_answer() {
 }
 
 #[tokio::test]
-async fn what_every_item_has_is_the_modification_of_the_same_name() {
+async fn deviation_of_every_item_equals_modification() {
     let all = |items: usize, value: f64| vec![value; items];
     let pairs = [
         (json!({ "tooth_radius_um": all(28, 2.0) }), json!({ "tooth_radius_um": 2.0 })),
@@ -159,7 +159,7 @@ async fn what_every_item_has_is_the_modification_of_the_same_name() {
 }
 
 #[tokio::test]
-async fn a_list_that_does_not_fit_is_told_at_its_place_and_every_entry_out_of_range_at_its_own() {
+async fn reports_misfit_list_and_entries_at_their_places() {
     let mut walls = one(27, 3, 2e6);
     walls[5] = -2e6;
     let deviations = json!({
@@ -191,23 +191,23 @@ async fn a_list_that_does_not_fit_is_told_at_its_place_and_every_entry_out_of_ra
             ("/load/input_torque_nm", "out_of_range", 0.0, 1e-12),
         ]
     );
-    // Whoever reads no deviations is not bothered by them.
+    // Geometry does not read deviations.
     Service::new().post("/v1/geometry", &document).await.found();
 }
 
 #[tokio::test]
-async fn of_thousands_of_entries_out_of_range_the_first_hundred_are_told() {
+async fn reports_first_hundred_of_many_bad_entries() {
     let document = with_deviations(json!({ "wave_generator_lobe_um": vec![2e6; 5000] }));
     for path in ["/v1/sweep", "/v1/accuracy"] {
         let problem = Service::new().post(path, &document).await.refused(422, "impossible_design");
-        // Each of them, and that there are two lobes.
-        assert_eq!(problem["detail"], "5001 values are impossible; `errors` names the first 100", "{path}");
+        // All entries are out of range, and the list is too long for two lobes.
+        assert_eq!(problem["detail"], "5001 values are impossible. `errors` lists the first 100", "{path}");
         assert_eq!(problem["errors"].as_array().unwrap().len(), 100, "{path}");
     }
 }
 
 #[tokio::test]
-async fn a_list_takes_numbers_alone() {
+async fn list_takes_numbers_only() {
     for (wrong, pointer) in [
         (json!({ "slot_wall_um": 1.0 }), "/deviations/slot_wall_um"),
         (json!({ "slot_wall_um": [0.0, "1"] }), "/deviations/slot_wall_um/1"),
@@ -219,7 +219,7 @@ async fn a_list_takes_numbers_alone() {
 }
 
 #[tokio::test]
-async fn projection_takes_no_deviations_but_zeros() {
+async fn projection_takes_only_zero_deviations() {
     let document = with(&spelled_out(), "/deviations", every_kind());
     let problem = Service::new().post("/v1/sweep", &document).await.refused(422, "impossible_design");
     let errors = problem["errors"].as_array().unwrap();
@@ -230,7 +230,7 @@ async fn projection_takes_no_deviations_but_zeros() {
 }
 
 #[tokio::test]
-async fn a_part_too_full_is_told_with_slot_lobe_and_input_angle() {
+async fn reports_interference_with_slot_lobe_and_input_angle() {
     let full = with_deviations(json!({ "tooth_radius_um": one(28, 11, -20.0) }));
     for sweep in [json!({ "samples": 4 }), json!({ "tolerance": 1e-3 })] {
         let document = with(&full, "/sweep", sweep);
@@ -243,8 +243,8 @@ async fn a_part_too_full_is_told_with_slot_lobe_and_input_angle() {
 }
 
 #[tokio::test]
-async fn a_sweep_of_deviations_stays_within_the_limit_on_states() {
-    // Some 14 teeth at each of 364 times 4 input angles.
+async fn deviation_sweep_keeps_limit_on_states() {
+    // About 14 teeth at each of 364 times 4 input angles.
     let document = with_deviations(every_kind());
     let service = Service::within(Limits { max_states: 10_000, ..LIMITS });
     let problem = service.post("/v1/sweep", &document).await.refused(422, "too_many_states");
@@ -257,7 +257,7 @@ async fn a_sweep_of_deviations_stays_within_the_limit_on_states() {
 }
 
 #[tokio::test]
-async fn accuracy_measures_the_design_with_its_deviations() {
+async fn accuracy_includes_deviations() {
     let document = with_deviations(json!({ "wave_generator_runout": { "amount_um": 2.0 } }));
     let answer = Service::new().post("/v1/accuracy", &document).await.found();
     let ways = answer["ways"].as_array().unwrap();
@@ -266,18 +266,18 @@ async fn accuracy_measures_the_design_with_its_deviations() {
     // At least twelve teeth of both zones at eleven input angles.
     let coarsest = ways.iter().find(|way| way["samples"] == 10).unwrap();
     assert!(coarsest["states"].as_u64().unwrap() >= 11 * 12, "{coarsest}");
-    // `projection` does not take them.
+    // `projection` does not support deviations.
     let unavailable = answer["unavailable"].as_array().unwrap();
     assert!(unavailable.iter().all(|model| model["compatibility"] == "projection"), "{unavailable:?}");
     assert!(!unavailable.is_empty());
 }
 
 #[tokio::test]
-async fn equal_deviations_have_one_key_and_others_another() {
+async fn only_equal_deviations_share_a_key() {
     let key = async |document: &Value| Service::new().post("/v1/sweep", document).await.etag().to_owned();
     let own = key(&with_deviations(json!({ "wave_generator_lobe_um": [0.0, 1.0] }))).await;
     assert_eq!(own, key(&with_deviations(json!({ "wave_generator_lobe_um": [-0.0, 1], "slot_wall_um": [] }))).await);
-    // An entry that wanders from one list into the next would leave the same numbers in a row.
+    // An entry moved to the next list would leave the same sequence of numbers.
     let lists = [
         json!({ "wave_generator_lobe_um": [1.0, 0.0] }),
         json!({ "wave_generator_runout": { "angle_deg": 1.0 } }),
@@ -289,7 +289,7 @@ async fn equal_deviations_have_one_key_and_others_another() {
 }
 
 #[tokio::test]
-async fn deviations_come_as_csv_text_and_plots_and_with_losses_too() {
+async fn deviations_appear_in_csv_text_and_plots() {
     let friction = crate::friction::on(&json!({ "kind": "plain", "coefficient": 0.02 }));
     let document = with(&deviating(), "/friction", friction);
     let service = Service::new();
@@ -311,15 +311,15 @@ async fn deviations_come_as_csv_text_and_plots_and_with_losses_too() {
     assert!(svg.contains("force, largest of all teeth, N"), "{svg}");
 }
 
-/// How many points each curve of a picture of plots has.
+/// Counts the points of each plotted curve.
 fn points_of_curves(svg: &str) -> Vec<usize> {
     let paths = svg.split("<path d=\"M ").skip(1).filter_map(|path| path.split_once('"'));
     paths.map(|(path, _)| path.split(" L ").count()).collect()
 }
 
-/// Where teeth enter under load the curves are cut at each, and of ten thousand teeth a plot of few states took forty megabytes.
+/// Curves are cut where teeth enter under load, so many teeth could make a plot of many megabytes.
 #[tokio::test]
-async fn curves_have_no_more_pieces_than_can_be_seen_however_many_teeth_enter_under_load() {
+async fn plot_has_bounded_number_of_pieces() {
     let document = json!({
         "drive": {
             "wave_generator": { "kind": "harmonic", "lobes": 20, "mean_radius_mm": 19_998.0, "amplitude_mm": 0.05 },
@@ -345,7 +345,7 @@ async fn curves_have_no_more_pieces_than_can_be_seen_however_many_teeth_enter_un
 }
 
 #[tokio::test]
-async fn where_single_items_deviate_a_plot_has_one_load_for_each_place_the_largest_of_all_teeth() {
+async fn plot_with_deviations_shows_largest_tooth_load() {
     let document = with(&deviating(), "/sweep/samples", json!(5));
     let states = swept(&document).await["states"].clone();
     let mut places = numbers(&states["position_deg"]);
@@ -355,7 +355,7 @@ async fn where_single_items_deviate_a_plot_has_one_load_for_each_place_the_large
     assert!(places.len() * 10 < stated, "{} places of {stated} states", places.len());
     let question = Question::post("/v1/sweep", document.to_string()).with("accept", "image/svg+xml");
     assert_eq!(points_of_curves(Service::new().ask(&question).await.text()), [places.len(); 6]);
-    // Swept to a tolerance the teeth come by at places of their own: as many stretches of the pass.
+    // In a tolerance sweep teeth have different positions, so the curve divides the pass into intervals.
     let document = with(&with(&document, "/sweep", json!({ "tolerance": 1e-3 })), "/load/input_torque_nm", json!(5.0));
     let question = Question::post("/v1/sweep", document.to_string()).with("accept", "image/svg+xml");
     let curves = points_of_curves(Service::new().ask(&question).await.text());
@@ -363,7 +363,7 @@ async fn where_single_items_deviate_a_plot_has_one_load_for_each_place_the_large
 }
 
 #[tokio::test]
-async fn where_zones_are_unlike_a_plots_curve_ends_at_each_jump() {
+async fn plot_curve_of_unlike_zones_ends_at_jumps() {
     // Case 5.2 with an odd number of teeth.
     let unlike = json!({
         "drive": {
@@ -376,7 +376,7 @@ async fn where_zones_are_unlike_a_plots_curve_ends_at_each_jump() {
     assert_eq!(found["enters_under_load"], true);
     let question = Question::post("/v1/sweep", unlike.to_string()).with("accept", "image/svg+xml");
     let curves = points_of_curves(Service::new().ask(&question).await.text());
-    // As many teeth come after a tooth while it meshes, at each of which it jumps.
+    // Each tooth that enters while another one meshes adds a jump to its curve.
     let jumps = usize::try_from(found["teeth_in_mesh_per_zone"]["min"].as_u64().unwrap()).unwrap();
     assert_eq!(curves.iter().filter(|points| **points > 5).count(), 6 * (jumps + 1), "{curves:?}");
 }

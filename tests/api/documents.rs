@@ -1,4 +1,4 @@
-//! What a design document may leave out, how it may be spelled, and what it may not say.
+//! Design documents: defaults, spelling and structural faults.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,7 @@ use crate::designs::{
     with_twice, without,
 };
 
-/// That the text is the same question as the document, whose answer the service has already.
+/// Asserts that the text is the same question as the document, whose answer is cached.
 async fn assert_same(service: &Service, path: &str, document: &Answer, text: &str) {
     let answer = service.post_text(path, text).await;
     assert_eq!(answer.status, 200, "{path}: {text}: {}", answer.text());
@@ -17,7 +17,7 @@ async fn assert_same(service: &Service, path: &str, document: &Answer, text: &st
     assert!(answer.is_hit(), "{path}: solved anew for {text}");
 }
 
-/// That all of these spell one design.
+/// Asserts that all spellings mean one design.
 async fn assert_all_same(document: &Value, spellings: impl IntoIterator<Item = String>) {
     let spellings: Vec<_> = spellings.into_iter().collect();
     for path in ENDPOINTS {
@@ -31,7 +31,7 @@ async fn assert_all_same(document: &Value, spellings: impl IntoIterator<Item = S
     }
 }
 
-/// All that may be left out of a document, each with another value than its default.
+/// Lists each optional field with a value other than its default.
 fn defaults() -> Vec<(&'static str, Value)> {
     vec![
         ("/drive/teeth/installed", json!(14)),
@@ -61,16 +61,16 @@ fn defaults() -> Vec<(&'static str, Value)> {
 }
 
 #[tokio::test]
-async fn each_field_left_out_means_its_default() {
+async fn each_omitted_field_means_its_default() {
     let document = defaults_spelled_out();
-    // A law that is left out is one that no name stands for: what holds best for the drive at hand.
+    // No name stands for an omitted law: the drive decides.
     let fields = defaults().into_iter().map(|(pointer, _)| pointer).filter(|&pointer| pointer != "/model/stiffness");
     let shortened = fields.map(|pointer| without(&document, pointer).to_string());
     assert_all_same(&document, shortened).await;
 }
 
 #[tokio::test]
-async fn everything_optional_left_out_at_once_means_all_defaults() {
+async fn minimal_document_means_all_defaults() {
     let empty =
         ["/materials", "/model", "/sweep", "/profile"].map(|pointer| with(&shortest(), pointer, json!({})).to_string());
     let nulled = with(&shortest(), "/drive/ring/tip_radius_mm", Value::Null).to_string();
@@ -78,21 +78,21 @@ async fn everything_optional_left_out_at_once_means_all_defaults() {
 }
 
 #[tokio::test]
-async fn beside_projection_a_missing_stiffness_means_linear() {
+async fn omitted_stiffness_under_projection_means_linear() {
     let named = with(&shortest(), "/model", of_the_paper());
     let left_out = with(&shortest(), "/model", json!({ "compatibility": "projection" }));
     assert_all_same(&named, [left_out.to_string()]).await;
 }
 
 #[tokio::test]
-async fn balls_need_no_model_and_mean_virtual_work_and_hertz() {
+async fn balls_default_to_virtual_work_and_hertz() {
     let balls = with(&shortest(), "/drive/teeth", json!({ "shape": "ball", "count": 28, "radius_mm": 5.0 }));
     let named = with(&balls, "/model", json!({ "compatibility": "virtual_work", "stiffness": { "law": "hertz" } }));
     assert_all_same(&named, [balls.to_string()]).await;
 }
 
 #[tokio::test]
-async fn projection_takes_no_logarithmic_law_no_balls_law_and_no_series_compliance() {
+async fn projection_rejects_johnson_hertz_and_series_compliance() {
     let model = |more: Value| {
         let mut model = json!({ "compatibility": "projection" });
         model.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
@@ -115,7 +115,7 @@ async fn projection_takes_no_logarithmic_law_no_balls_law_and_no_series_complian
 }
 
 #[tokio::test]
-async fn a_value_other_than_the_default_is_another_question_to_some_endpoint() {
+async fn each_non_default_value_changes_some_key() {
     let document = defaults_spelled_out();
     for (pointer, other) in defaults() {
         let service = Service::new();
@@ -139,7 +139,7 @@ async fn field_order_and_white_space_are_irrelevant() {
 }
 
 #[tokio::test]
-async fn a_number_means_its_value_however_it_is_spelled() {
+async fn equal_numbers_may_be_spelled_differently() {
     let text = spelled_out().to_string();
     let replaced = |from: &str, to: &str| {
         assert!(text.contains(from), "{from} is not in {text}");
@@ -172,7 +172,7 @@ async fn a_number_means_its_value_however_it_is_spelled() {
 }
 
 #[tokio::test]
-async fn a_name_means_its_letters_however_they_are_escaped() {
+async fn names_may_be_escaped() {
     let text = spelled_out().to_string();
     assert_all_same(
         &spelled_out(),
@@ -200,7 +200,7 @@ async fn minus_zero_is_zero() {
 }
 
 #[tokio::test]
-async fn a_field_that_the_document_does_not_know_is_refused_by_name_at_every_level_by_every_endpoint() {
+async fn rejects_unknown_field_at_every_level() {
     let service = Service::new();
     for document in [spelled_out(), every_number()] {
         for object in pointers(&document, Value::is_object) {
@@ -218,16 +218,16 @@ async fn a_field_that_the_document_does_not_know_is_refused_by_name_at_every_lev
 }
 
 #[tokio::test]
-async fn a_pointer_escapes_what_json_pointers_escape() {
+async fn pointer_is_escaped_as_json_pointer() {
     let document = with(&shortest(), "/drive/ring", json!({ "teeth": 26, "a/b~c": 1 }));
     let (at, code, detail) = Service::new().post("/v1/sweep", &document).await.faulty_field();
     assert_eq!((at.as_str(), code.as_str()), ("/drive/ring/a~1b~0c", "unknown_field"));
     assert!(detail.contains("a/b~c"), "{detail}");
 }
 
-/// A name may be as long as a document; a problem told it six times, of which nothing was counted.
+/// A name may be as long as a document, and a problem repeats it.
 #[tokio::test]
-async fn a_name_as_long_as_its_document_is_told_by_its_beginning() {
+async fn long_field_name_is_reported_by_its_beginning() {
     let name = "~".repeat(60_000);
     let map =
         json!({ "study": "map", "base": shortest(), "over": { format!("/drive/{name}"): { "min": 1, "max": 2 } } });
@@ -246,7 +246,7 @@ async fn a_name_as_long_as_its_document_is_told_by_its_beginning() {
 }
 
 #[tokio::test]
-async fn a_typo_is_never_a_silent_default() {
+async fn typo_never_means_a_default() {
     let service = Service::new();
     for (right, wrong) in [
         ("/drive/teeth/installed", "/drive/teeth/Installed"),
@@ -266,7 +266,7 @@ async fn a_typo_is_never_a_silent_default() {
 }
 
 #[tokio::test]
-async fn stiffnesses_are_unknown_to_the_linear_law() {
+async fn linear_law_takes_no_fixed_stiffness() {
     let law = json!({ "law": "linear", "ring_n_per_mm": 5e5 });
     let document = with(&spelled_out(), "/model/stiffness", law);
     let (at, code, _) = Service::new().post("/v1/sweep", &document).await.faulty_field();
@@ -283,11 +283,11 @@ async fn a_stiffness_names_its_law() {
 }
 
 #[tokio::test]
-async fn an_array_is_no_object_at_any_level() {
+async fn rejects_array_in_place_of_object() {
     let service = Service::new();
     for document in [spelled_out(), every_number()] {
         for pointer in pointers(&document, Value::is_object) {
-            // The values of the object's fields in order, which a lenient reader would take for it.
+            // The values of the object's fields in order. A lenient reader would accept them.
             let fields = document.pointer(&pointer).unwrap().as_object().unwrap();
             for array in [json!([]), fields.values().cloned().collect::<Value>()] {
                 for path in ENDPOINTS {
@@ -301,7 +301,7 @@ async fn an_array_is_no_object_at_any_level() {
 }
 
 #[tokio::test]
-async fn null_is_refused_everywhere_but_for_the_tip_radius() {
+async fn rejects_null_except_for_tip_radius() {
     let service = Service::new();
     let null_may_stand_here = |pointer: &str| pointer == "/drive/ring/tip_radius_mm";
     for document in [spelled_out(), every_number()] {
@@ -321,14 +321,14 @@ async fn null_is_refused_everywhere_but_for_the_tip_radius() {
 }
 
 #[tokio::test]
-async fn an_output_torque_is_not_null_either() {
+async fn rejects_null_output_torque() {
     let document = with(&spelled_out(), "/load/output_torque_nm", Value::Null);
     let (at, code, _) = Service::new().post("/v1/sweep", &document).await.faulty_field();
     assert_eq!((at.as_str(), code.as_str()), ("/load/output_torque_nm", "wrong_type"));
 }
 
 #[tokio::test]
-async fn a_required_field_that_is_missing_is_named() {
+async fn names_missing_required_field() {
     let service = Service::new();
     for pointer in [
         "/drive",
@@ -354,7 +354,7 @@ async fn a_required_field_that_is_missing_is_named() {
 }
 
 #[tokio::test]
-async fn a_sweep_needs_a_load_with_exactly_one_torque() {
+async fn sweep_needs_exactly_one_torque() {
     let service = Service::new();
     for (load, expected) in [
         (None, "missing_field"),
@@ -372,7 +372,7 @@ async fn a_sweep_needs_a_load_with_exactly_one_torque() {
 }
 
 #[tokio::test]
-async fn of_structural_faults_the_first_in_the_documents_order_is_told() {
+async fn reports_first_structural_fault_of_document() {
     let both_torques = with(&spelled_out(), "/load", json!({ "input_torque_nm": 20.0, "output_torque_nm": 280.0 }));
     let document = with(&both_torques, "/sweep", json!({ "samples": 50, "tolerance": 1e-6 }));
     let (at, _, _) = Service::new().post("/v1/sweep", &document).await.faulty_field();
@@ -380,7 +380,7 @@ async fn of_structural_faults_the_first_in_the_documents_order_is_told() {
 }
 
 #[tokio::test]
-async fn a_field_that_stands_twice_is_refused_at_every_level() {
+async fn rejects_duplicate_field_at_every_level() {
     let service = Service::new();
     for document in [spelled_out(), every_number()] {
         for pointer in pointers(&document, |_| true).into_iter().filter(|pointer| !pointer.is_empty()) {
@@ -393,7 +393,7 @@ async fn a_field_that_stands_twice_is_refused_at_every_level() {
 }
 
 #[tokio::test]
-async fn a_value_of_another_type_is_refused_with_its_place() {
+async fn rejects_wrong_type_with_its_place() {
     let service = Service::new();
     let document = every_number();
     let others = [json!("58.0"), json!(true), json!({}), json!([58.0])];
@@ -419,7 +419,7 @@ async fn a_value_of_another_type_is_refused_with_its_place() {
 }
 
 #[tokio::test]
-async fn a_word_that_is_no_choice_is_refused_with_the_choices() {
+async fn rejects_unknown_choice_and_lists_known_ones() {
     for (pointer, choices) in [
         ("/model/compatibility", &["projection", "virtual_work"][..]),
         ("/model/stiffness/law", &["linear", "fixed"]),
@@ -439,7 +439,7 @@ async fn a_word_that_is_no_choice_is_refused_with_the_choices() {
 const COUNTS: [&str; 4] = ["/drive/teeth/count", "/drive/teeth/installed", "/drive/ring/teeth", "/sweep/samples"];
 
 #[tokio::test]
-async fn a_count_that_is_not_whole_is_refused() {
+async fn rejects_fractional_count() {
     for pointer in COUNTS {
         for value in [28.5, 0.1, -0.5, 28.000_000_000_000_004, 1e-300] {
             let document = with(&spelled_out(), pointer, json!(value));
@@ -450,7 +450,7 @@ async fn a_count_that_is_not_whole_is_refused() {
 }
 
 #[tokio::test]
-async fn a_whole_count_of_any_size_is_out_of_range_and_not_of_another_type() {
+async fn huge_count_is_out_of_range() {
     for (pointer, limit) in COUNTS.into_iter().zip([1e4, 1e4, 1e4, 1e7]) {
         for value in [1e8, 9_007_199_254_740_993.0, 1e17, 1e300] {
             let document = with(&spelled_out(), pointer, json!(value));
@@ -465,7 +465,7 @@ async fn a_whole_count_of_any_size_is_out_of_range_and_not_of_another_type() {
 }
 
 #[tokio::test]
-async fn a_number_beyond_the_doubles_is_json_but_no_value() {
+async fn number_beyond_double_is_json_but_no_value() {
     let service = Service::new();
     let document = every_number();
     let many_digits = "9".repeat(400);
@@ -481,7 +481,7 @@ async fn a_number_beyond_the_doubles_is_json_but_no_value() {
 }
 
 #[tokio::test]
-async fn json_that_is_no_object_is_no_design_document() {
+async fn json_without_object_is_no_design_document() {
     for text in ["null", "true", "28", "-1.5e3", "\"drive\"", "[]", "[{}]", " [ ] "] {
         let (at, code, _) = Service::new().post_text("/v1/sweep", text).await.faulty_field();
         assert_eq!((at.as_str(), code.as_str()), ("", "wrong_type"), "{text}");
@@ -489,7 +489,7 @@ async fn json_that_is_no_object_is_no_design_document() {
 }
 
 #[tokio::test]
-async fn a_body_that_is_no_json_is_refused_as_such() {
+async fn rejects_body_that_is_no_json() {
     let service = Service::new();
     let whole = spelled_out().to_string();
     let commented = format!("// a drive\n{whole}");
@@ -536,7 +536,7 @@ async fn a_body_that_is_no_json_is_refused_as_such() {
 }
 
 #[tokio::test]
-async fn a_byte_order_mark_before_the_document_is_ignored() {
+async fn ignores_byte_order_mark() {
     let (service, document) = (Service::new(), spelled_out().to_string());
     let plain = service.post_text("/v1/sweep", document.clone()).await;
     let marked = service.post_text("/v1/sweep", format!("\u{feff}{document}")).await;
@@ -547,7 +547,7 @@ async fn a_byte_order_mark_before_the_document_is_ignored() {
 }
 
 #[tokio::test]
-async fn text_that_is_not_utf_8_is_no_json() {
+async fn rejects_text_that_is_not_utf_8() {
     let whole = spelled_out().to_string();
     let (head, tail) = whole.split_at(whole.find("28").unwrap());
     for bytes in [&b"\xff"[..], b"\xc3\x28", b"\xed\xa0\x80", b"\xf8\x88\x80\x80\x80"] {
@@ -564,9 +564,9 @@ async fn text_that_is_not_utf_8_is_no_json() {
 }
 
 #[tokio::test]
-async fn no_json_is_no_json_whatever_stands_before_the_fault() {
+async fn syntax_error_outranks_earlier_faults() {
     let service = Service::new();
-    // Each would be the first structural fault of a document; but there is no document.
+    // Each text has a structural fault before its syntax error.
     for text in [
         "{\"colour\": 1, ",
         "{\"drive\": 1e999, ",
@@ -579,7 +579,7 @@ async fn no_json_is_no_json_whatever_stands_before_the_fault() {
 }
 
 #[tokio::test]
-async fn json_nested_deeper_than_any_document_is_refused_as_no_design_document() {
+async fn rejects_json_nested_too_deep() {
     let service = Service::new();
     for depth in [100, 127, 128, 200, 5_000] {
         for (open, close) in [("[", "]"), ("{\"drive\":", "}")] {
@@ -592,14 +592,14 @@ async fn json_nested_deeper_than_any_document_is_refused_as_no_design_document()
 }
 
 #[tokio::test]
-async fn of_several_structural_faults_one_is_named() {
+async fn names_one_of_several_structural_faults() {
     let document = with(&without(&spelled_out(), "/drive/teeth/count"), "/colour", json!(1));
     let (at, ..) = Service::new().post("/v1/sweep", &document).await.faulty_field();
     assert!(["/drive/teeth/count", "/colour"].contains(&at.as_str()), "{at}");
 }
 
 #[tokio::test]
-async fn the_contracts_own_document_is_answered_by_every_endpoint_as_it_is_printed() {
+async fn every_endpoint_answers_the_documented_document() {
     for path in ENDPOINTS {
         assert_eq!(Service::new().post_text(path, designs::CONTRACT).await.status, 200, "{path}");
     }

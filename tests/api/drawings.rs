@@ -9,13 +9,13 @@ use crate::designs::{bored, eccentric, shortest, undercut, with};
 
 pub(crate) const PARTS: [&str; 4] = ["ring", "wave-generator", "carrier", "tooth"];
 
-/// Case 5.1 with a `parts` group.
+/// Returns case 5.1 with a `parts` group.
 pub(crate) fn made(parts: &str) -> Value {
     let document = with(&shortest(), "/parts", serde_json::from_str(parts).unwrap());
     with(&document, "/assembly", json!({}))
 }
 
-/// Parts of case 5.1 that cannot be made: the code, the field, its value and the limit.
+/// Parts of case 5.1 that cannot be made, with code, field, value and limit.
 pub(crate) const MISFITS: [(&str, &str, &str, f64, f64); 8] = [
     (r#"{ "ring": { "outer_radius_mm": 68 } }"#, "ring_without_rim", "/parts/ring/outer_radius_mm", 68.0, 68.000_068),
     (r#"{ "carrier": { "inner_radius_mm": 58 } }"#, "carrier_meets_cam", "/parts/carrier/inner_radius_mm", 58.0, 58.0),
@@ -68,7 +68,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
-/// The area of an outline: its chords' by the shoelace formula, and the segments between its arcs and their chords.
+/// Returns the area of an outline: the shoelace formula for its chords, plus the segments of its arcs.
 fn area_mm2(outline: &Value) -> f64 {
     if let Some(radius_mm) = outline["radius_mm"].as_f64() {
         return PI * radius_mm * radius_mm;
@@ -88,7 +88,7 @@ fn area_mm2(outline: &Value) -> f64 {
     outline["edges"].as_array().unwrap().iter().map(of_edge).sum()
 }
 
-/// The area of all prisms of a drawing of one part.
+/// Returns the area of all prisms in a drawing of one part.
 pub(crate) async fn part_area_mm2(part: &str, document: &Value) -> f64 {
     let drawing = drawn(part, document).await;
     let [body] = drawing["bodies"].as_array().unwrap().as_slice() else { panic!("{drawing}") };
@@ -97,7 +97,7 @@ pub(crate) async fn part_area_mm2(part: &str, document: &Value) -> f64 {
 }
 
 #[tokio::test]
-async fn what_cannot_be_made_is_refused_with_value_and_limit() {
+async fn rejects_unmakeable_part_with_value_and_limit() {
     for (parts, code, pointer, value, limit) in MISFITS {
         let problem =
             Service::new().post("/v1/drawings/assembly", &made(parts)).await.refused(422, "impossible_design");
@@ -111,7 +111,7 @@ async fn what_cannot_be_made_is_refused_with_value_and_limit() {
 }
 
 #[tokio::test]
-async fn a_wall_that_is_none_to_cad_is_refused_and_the_limit_leads_to_one_that_is() {
+async fn rejects_wall_too_thin_for_cad() {
     for (group, field, none_mm, code) in [
         ("wave_generator", "bore_radius_mm", 56.0 - 1e-7, "bore_takes_cam"),
         ("ring", "outer_radius_mm", 68.0 + 1e-7, "ring_without_rim"),
@@ -126,7 +126,7 @@ async fn a_wall_that_is_none_to_cad_is_refused_and_the_limit_leads_to_one_that_i
 }
 
 #[tokio::test]
-async fn a_step_makes_a_part_once_names_it_by_the_design_colours_it_and_extrudes_its_flanks() {
+async fn step_extrudes_named_and_coloured_parts() {
     let hash = drawn("assembly", &undercut()).await["design_hash"].as_str().unwrap()[..8].to_owned();
     let text = written("assembly", &undercut(), "model/step").await;
     let count = |what: &str| text.matches(what).count();
@@ -142,24 +142,24 @@ async fn a_step_makes_a_part_once_names_it_by_the_design_colours_it_and_extrudes
     assert_eq!(written("tooth", &undercut(), "model/step").await.matches("NEXT_ASSEMBLY_USAGE_OCCURRENCE").count(), 0);
 }
 
-/// Polynomials are held to their own error, not to that of chords, so a solid's faces are few, and no more where chords are finer.
+/// Polynomials follow their own error limit, so a solid has few faces even with a fine chord tolerance.
 #[tokio::test]
-async fn a_step_of_ten_nanometres_has_a_quarter_of_a_megabyte() {
+async fn step_at_ten_nanometres_is_small() {
     let [of_10_nm, of_1_nm] = [1e-3, 1e-4].map(async |tolerance_mm| {
         let profile = json!({ "chord_tolerance_mm": tolerance_mm });
         written("ring", &with(&shortest(), "/profile", profile), "model/step").await
     });
     let (of_10_nm, of_1_nm) = (of_10_nm.await, of_1_nm.await);
     let polynomials = |text: &str| text.matches("=B_SPLINE_CURVE_WITH_KNOTS(").count();
-    // Each stands twice, below and above.
+    // Each edge appears twice, at the bottom and at the top.
     assert_eq!(polynomials(&of_10_nm), 2 * 5 * 26);
     assert!(of_10_nm.len() < 240_000, "{} bytes", of_10_nm.len());
     assert!(polynomials(&of_1_nm) < 2 * 8 * 26, "{}", polynomials(&of_1_nm));
 }
 
-/// OpenCascade's nine places sum what stands on a polynomial of degree 9 exactly, and on nothing that is made of several.
+/// OpenCascade's quadrature with nine points integrates these exactly, but no piecewise polynomial.
 #[tokio::test]
-async fn every_face_of_a_step_is_one_polynomial_of_degree_eight_at_most() {
+async fn step_faces_are_polynomials_up_to_degree_eight() {
     let text = written("assembly", &undercut(), "model/step").await;
     for line in text.lines().filter(|line| line.contains("B_SPLINE_CURVE_WITH_KNOTS")) {
         let degree: usize = line.split("('',").nth(1).unwrap().split(',').next().unwrap().parse().unwrap();
@@ -170,7 +170,7 @@ async fn every_face_of_a_step_is_one_polynomial_of_degree_eight_at_most() {
 }
 
 #[tokio::test]
-async fn a_modification_that_leaves_nothing_names_its_number_and_a_limit_where_there_is_one() {
+async fn excessive_modification_names_number_and_limit() {
     let refused = async |modification: Value| {
         let document = with(&shortest(), "/modification", modification);
         let problem = Service::new().post("/v1/drawings/assembly", &document).await.refused(422, "impossible_design");
@@ -184,9 +184,9 @@ async fn a_modification_that_leaves_nothing_names_its_number_and_a_limit_where_t
     assert_eq!(ring, ("/modification/ring_rotation_arcsec".to_owned(), 30_000.0, None));
 }
 
-/// A drawing's tag follows from what it shows, so a modification is another drawing, and another design.
+/// A drawing's entity tag follows from what it shows, so a modification gives another tag.
 #[tokio::test]
-async fn a_modification_is_drawn_by_every_part_that_it_is_of() {
+async fn modification_changes_drawing_of_each_part_involved() {
     for (part, modification) in [
         ("ring", json!({ "ring_tip_relief": { "amount_um": 5.0, "start_deg": 60.0, "power": 2.0 } })),
         ("ring", json!({ "ring_path_shift_um": -2.0 })),
@@ -203,7 +203,7 @@ async fn a_modification_is_drawn_by_every_part_that_it_is_of() {
 }
 
 #[tokio::test]
-async fn a_turned_carrier_stands_that_much_further_on_than_its_teeth() {
+async fn turned_carrier_leads_its_teeth() {
     let turned = with(&shortest(), "/modification", json!({ "carrier_rotation_arcsec": 36.0 }));
     let angle = async |document: &Value| {
         let drawing = drawn("assembly", document).await;
@@ -214,7 +214,7 @@ async fn a_turned_carrier_stands_that_much_further_on_than_its_teeth() {
 }
 
 #[tokio::test]
-async fn balls_are_spheres_and_every_other_part_a_prism() {
+async fn balls_are_spheres_and_other_parts_prisms() {
     let document: Value = serde_json::from_str(include_str!("../../examples/balls.json")).unwrap();
     let drawing = drawn("assembly", &document).await;
     for body in drawing["bodies"].as_array().unwrap() {
@@ -226,7 +226,7 @@ async fn balls_are_spheres_and_every_other_part_a_prism() {
 }
 
 #[tokio::test]
-async fn an_eccentric_is_arcs_and_cylinders() {
+async fn eccentric_is_arcs_and_cylinders() {
     let document =
         with(&eccentric(), "/parts", json!({ "wave_generator": { "bore_radius_mm": 10.0, "clearance_um": 50.0 } }));
     let drawing = drawn("wave-generator", &document).await;
@@ -250,28 +250,28 @@ async fn an_eccentric_is_arcs_and_cylinders() {
 }
 
 #[tokio::test]
-async fn a_part_is_drawn_though_another_cannot_be_made() {
+async fn draws_part_though_another_is_impossible() {
     let document = made(r#"{ "ring": { "outer_radius_mm": 10 } }"#);
     drawn("carrier", &document).await;
     Service::new().post("/v1/drawings/ring", &document).await.refused(422, "impossible_design");
 }
 
 #[tokio::test]
-async fn impossible_values_of_drive_and_parts_are_reported_together() {
+async fn reports_impossible_drive_and_parts_together() {
     let document = with(&made(r#"{ "teeth": { "clearance_um": -1 } }"#), "/drive/teeth/radius_mm", json!(0));
     let problem = Service::new().post("/v1/drawings/tooth", &document).await.refused(422, "impossible_design");
     assert_eq!(problem["errors"].as_array().unwrap().len(), 2, "{problem}");
 }
 
 #[tokio::test]
-async fn an_unknown_part_is_not_found_and_the_known_ones_are_named() {
+async fn unknown_part_is_not_found() {
     let problem = Service::new().post("/v1/drawings/gearbox", &shortest()).await.refused(404, "not_found");
     let detail = problem["detail"].as_str().unwrap();
     assert!(PARTS.iter().chain(&["assembly"]).all(|part| detail.contains(part)), "{detail}");
 }
 
 #[tokio::test]
-async fn each_edge_starts_at_the_very_point_where_the_one_before_ends() {
+async fn each_edge_starts_where_previous_ends() {
     for document in [shortest(), undercut(), bored()] {
         for part in PARTS {
             for body in drawn(part, &document).await["bodies"].as_array().unwrap() {
@@ -291,7 +291,7 @@ async fn each_edge_starts_at_the_very_point_where_the_one_before_ends() {
     }
 }
 
-/// The chords are true to this, far finer than what areas are compared to.
+/// Sets a chord tolerance far below the one of compared areas.
 pub(crate) fn finely(document: &Value) -> Value {
     with(document, "/profile", json!({ "chord_tolerance_mm": 1e-6 }))
 }
@@ -301,7 +301,7 @@ fn assert_area(found: f64, expected: f64, what: &str) {
 }
 
 #[tokio::test]
-async fn cam_tooth_and_carrier_have_the_areas_of_their_closed_forms() {
+async fn cam_tooth_and_carrier_have_closed_form_areas() {
     let document = finely(&made(
         r#"{ "wave_generator": { "bore_radius_mm": 20 }, "carrier": { "inner_radius_mm": 59, "outer_radius_mm": 65 } }"#,
     ));
@@ -317,9 +317,9 @@ async fn cam_tooth_and_carrier_have_the_areas_of_their_closed_forms() {
     assert_area(part_area_mm2("tooth", &thinner).await, PI * 4.99 * 4.99, "tooth with clearance");
 }
 
-/// Steiner: set back by c, a smooth closed curve of length L bounds L c + π c² more outward, L c - π c² less inward.
+/// Steiner: an offset by c changes the area of a closed curve of length L by L c + π c² outward, L c - π c² inward.
 #[tokio::test]
-async fn a_clearance_changes_areas_by_length_times_clearance() {
+async fn clearance_changes_area_by_length_times_clearance() {
     let clearance_mm = 0.1;
     for (part, group, outline, outward) in
         [("ring", "ring", "/bodies/0/holes/0", 1.0), ("wave-generator", "wave_generator", "/bodies/0/outer", -1.0)]
@@ -340,7 +340,7 @@ async fn a_clearance_changes_areas_by_length_times_clearance() {
 }
 
 #[tokio::test]
-async fn a_bored_ring_has_arcs_for_lands_and_an_undercut_one_points() {
+async fn bored_ring_has_lands_and_undercut_has_points() {
     let edges = |drawing: Value| drawing["bodies"][0]["holes"][0]["edges"].as_array().unwrap().clone();
     let kinds = |edges: &[Value], kind: &str| edges.iter().filter(|edge| edge["kind"] == kind).count();
     let bored = edges(drawn("ring", &bored()).await);
@@ -360,7 +360,7 @@ async fn a_bored_ring_has_arcs_for_lands_and_an_undercut_one_points() {
 }
 
 #[tokio::test]
-async fn every_format_says_what_it_is_of() {
+async fn every_format_names_its_content() {
     for part in PARTS.iter().chain(&["assembly"]) {
         let drawing = drawn(part, &bored()).await;
         let hash = drawing["design_hash"].as_str().unwrap();
@@ -382,7 +382,7 @@ async fn every_format_says_what_it_is_of() {
 }
 
 #[tokio::test]
-async fn a_dxf_declares_millimetres_and_a_layer_a_part_and_closes_every_polyline() {
+async fn dxf_has_millimetres_layers_and_closed_polylines() {
     let text = written("assembly", &undercut(), "image/vnd.dxf").await;
     let pairs: Vec<_> = text
         .split("\r\n")
@@ -404,7 +404,7 @@ async fn a_dxf_declares_millimetres_and_a_layer_a_part_and_closes_every_polyline
 }
 
 #[tokio::test]
-async fn parts_change_no_load_and_are_read_by_drawings_and_by_the_estimates_of_what_gives_way() {
+async fn parts_change_estimates_but_no_load() {
     let service = Service::new();
     let document = made(r#"{ "ring": { "outer_radius_mm": 1 } }"#);
     for path in ["/v1/geometry", "/v1/coincidence-degree"] {
@@ -424,7 +424,7 @@ async fn parts_change_no_load_and_are_read_by_drawings_and_by_the_estimates_of_w
 }
 
 #[tokio::test]
-async fn a_drawing_of_one_part_does_not_ask_at_what_angle() {
+async fn drawing_of_one_part_needs_no_angle() {
     let service = Service::new();
     service.post("/v1/drawings/ring", &shortest()).await.found();
     let turned = with(&shortest(), "/assembly", json!({ "input_angle_deg": 12.5 }));
@@ -433,10 +433,9 @@ async fn a_drawing_of_one_part_does_not_ask_at_what_angle() {
     assert!(service.post("/v1/drawings/assembly", &turned).await.is_miss());
 }
 
-/// In the wave generator's frame every tooth touches the cam from outside and, in the ring's, its flank from inside: the distance
-/// of its centre from the outline is its radius, to the chord tolerance, wherever it is engaged.
+/// The distance of a tooth's centre from the outline of cam and ring is its radius, within the chord tolerance.
 #[tokio::test]
-async fn in_an_assembly_every_engaged_tooth_touches_cam_and_ring() {
+async fn engaged_teeth_touch_cam_and_ring() {
     for (design, start_deg) in [(shortest(), 90.0), (undercut(), 43.607_598_857_26), (bored(), 34.0787)] {
         let radius_mm = design["drive"]["teeth"]["radius_mm"].as_f64().unwrap();
         for angle_deg in [0.0, 7.0, 100.0, -33.0, 359.0, 1e5 + 0.25] {
@@ -464,7 +463,7 @@ async fn in_an_assembly_every_engaged_tooth_touches_cam_and_ring() {
     }
 }
 
-/// The chords of an outline where it stands; arcs, which are lands here, as their three points.
+/// Returns the chords of a placed outline, with each arc (a land here) as three points.
 fn polygon(outline: &Value, placement: &Value) -> Vec<[f64; 2]> {
     let (sin, cos) = placement["rotation_deg"].as_f64().unwrap().to_radians().sin_cos();
     let edges = outline["edges"].as_array().unwrap();
@@ -472,7 +471,7 @@ fn polygon(outline: &Value, placement: &Value) -> Vec<[f64; 2]> {
     points.map(|(x, y)| [x * cos - y * sin, x * sin + y * cos]).collect()
 }
 
-/// The least distance of a point from a closed polygon.
+/// Returns the least distance of a point from a closed polygon.
 fn distance(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
     let of_chord = |(from, to): (&[f64; 2], &[f64; 2])| {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);

@@ -1,4 +1,4 @@
-//! What AutoCAD requires of a DXF, as docs/dxf.md lists it: each line of that list is a test here.
+//! AutoCAD's requirements for DXF. Each line of the list in docs/reference/dxf.md has a test.
 
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::FRAC_PI_2;
@@ -14,7 +14,7 @@ type Pair = (i32, String);
 
 const PARTS: [&str; 5] = ["ring", "wave-generator", "carrier", "tooth", "assembly"];
 
-/// The pairs of every part's drawing.
+/// Returns the pairs of every part's drawing.
 async fn drawings() -> Vec<Vec<Pair>> {
     let mut drawings = Vec::new();
     for part in PARTS {
@@ -34,7 +34,7 @@ async fn pairs(part: &str, document: &Value) -> Vec<Pair> {
     lines.chunks_exact(2).map(|pair| (pair[0].trim().parse().unwrap(), pair[1].to_owned())).collect()
 }
 
-/// The pairs between a section's name and its end.
+/// Returns the pairs between a section's name and its end.
 fn section<'a>(pairs: &'a [Pair], name: &str) -> &'a [Pair] {
     let is = |pair: &Pair, code: i32, value: &str| pair.0 == code && pair.1 == value;
     let start = pairs.windows(2).position(|two| is(&two[0], 0, "SECTION") && is(&two[1], 2, name));
@@ -43,7 +43,7 @@ fn section<'a>(pairs: &'a [Pair], name: &str) -> &'a [Pair] {
     &pairs[start..start + end]
 }
 
-/// The objects of a section: from one group 0 to the next.
+/// Splits a section into objects, each from one group 0 to the next.
 fn objects(pairs: &[Pair]) -> Vec<&[Pair]> {
     let mut starts: Vec<_> = (0..pairs.len()).filter(|&index| pairs[index].0 == 0).collect();
     starts.push(pairs.len());
@@ -55,7 +55,7 @@ fn value(object: &[Pair], code: i32) -> &str {
     &found.unwrap_or_else(|| panic!("no group {code} in {object:?}")).1
 }
 
-/// The records of a table, and what stands before them.
+/// Returns the head and the records of a table.
 fn table<'a>(pairs: &'a [Pair], name: &str) -> (&'a [Pair], Vec<&'a [Pair]>) {
     let objects = objects(section(pairs, "TABLES"));
     let start = objects.iter().position(|object| object[0].1 == "TABLE" && object[1].1 == name);
@@ -68,14 +68,14 @@ fn names<'a>(records: &[&'a [Pair]]) -> Vec<&'a str> {
     records.iter().map(|record| value(record, 2)).collect()
 }
 
-/// The object of a handle.
+/// Returns the object with this handle.
 fn object<'a>(pairs: &'a [Pair], handle: &str) -> &'a [Pair] {
     let objects = objects(section(pairs, "OBJECTS"));
     let found = objects.into_iter().find(|object| value(object, 5) == handle);
     found.unwrap_or_else(|| panic!("no object {handle}"))
 }
 
-/// The handle under a name in a dictionary.
+/// Returns the handle under a name in a dictionary.
 fn entry<'a>(dictionary: &'a [Pair], name: &str) -> &'a str {
     let place = dictionary.iter().position(|pair| pair.0 == 3 && pair.1 == name);
     let (code, handle) = &dictionary[place.unwrap_or_else(|| panic!("no {name} in {dictionary:?}")) + 1];
@@ -84,7 +84,7 @@ fn entry<'a>(dictionary: &'a [Pair], name: &str) -> &'a str {
 }
 
 #[tokio::test]
-async fn the_sections_stand_in_their_order_and_the_end_is_marked() {
+async fn sections_are_in_order_and_end_is_marked() {
     for pairs in drawings().await {
         let sections: Vec<_> =
             pairs.windows(2).filter(|two| two[0] == (0, "SECTION".into())).map(|two| two[1].1.as_str()).collect();
@@ -94,7 +94,7 @@ async fn the_sections_stand_in_their_order_and_the_end_is_marked() {
 }
 
 #[tokio::test]
-async fn the_header_names_version_and_next_handle() {
+async fn header_names_version_and_next_handle() {
     for pairs in drawings().await {
         let header = section(&pairs, "HEADER");
         let variable = |name: &str| &header[header.iter().position(|pair| pair.1 == name).unwrap() + 1];
@@ -105,7 +105,7 @@ async fn the_header_names_version_and_next_handle() {
     }
 }
 
-/// Of everything but header and classes: group 5, and 105 of dimension styles.
+/// Returns all handles: group 5, and group 105 for dimension styles. Header and classes have none.
 fn handles(pairs: &[Pair]) -> Vec<u32> {
     ["TABLES", "BLOCKS", "ENTITIES", "OBJECTS"]
         .iter()
@@ -116,7 +116,7 @@ fn handles(pairs: &[Pair]) -> Vec<u32> {
 }
 
 #[tokio::test]
-async fn every_object_has_a_handle_of_its_own_and_an_owner_that_exists() {
+async fn every_object_has_unique_handle_and_existing_owner() {
     for pairs in drawings().await {
         let handles = handles(&pairs);
         let distinct: HashSet<_> = handles.iter().collect();
@@ -129,7 +129,7 @@ async fn every_object_has_a_handle_of_its_own_and_an_owner_that_exists() {
 }
 
 #[tokio::test]
-async fn classes_declare_the_kinds_of_object_that_are_not_autocads_own() {
+async fn classes_declare_objects_beyond_autocads_own() {
     for pairs in drawings().await {
         let declared: HashMap<_, _> = objects(section(&pairs, "CLASSES"))
             .into_iter()
@@ -147,7 +147,7 @@ async fn classes_declare_the_kinds_of_object_that_are_not_autocads_own() {
 }
 
 #[tokio::test]
-async fn all_nine_tables_are_there_with_the_records_that_must_be() {
+async fn has_nine_tables_with_required_records() {
     for pairs in drawings().await {
         for (name, wanted) in [
             ("VPORT", vec!["*Active"]),
@@ -179,7 +179,7 @@ async fn all_nine_tables_are_there_with_the_records_that_must_be() {
 }
 
 #[tokio::test]
-async fn every_layer_has_a_colour_a_line_weight_and_the_plot_style_of_the_dictionary() {
+async fn layers_have_colour_line_weight_and_plot_style() {
     for pairs in drawings().await {
         let root = objects(section(&pairs, "OBJECTS"))[0];
         assert_eq!((root[0].1.as_str(), value(root, 330)), ("DICTIONARY", "0"));
@@ -206,7 +206,7 @@ async fn every_layer_has_a_colour_a_line_weight_and_the_plot_style_of_the_dictio
 }
 
 #[tokio::test]
-async fn a_polyline_tells_first_how_many_vertices_it_has() {
+async fn polyline_states_vertex_count_first() {
     for pairs in drawings().await {
         for entity in objects(section(&pairs, "ENTITIES")).into_iter().filter(|entity| entity[0].1 == "LWPOLYLINE") {
             let class = entity.iter().position(|pair| pair.1 == "AcDbPolyline").unwrap();
@@ -218,7 +218,7 @@ async fn a_polyline_tells_first_how_many_vertices_it_has() {
 }
 
 #[tokio::test]
-async fn extended_data_is_of_an_application_that_is_registered_and_short_enough() {
+async fn extended_data_names_registered_application() {
     for pairs in drawings().await {
         let (_, applications) = table(&pairs, "APPID");
         let names = names(&applications);
@@ -230,7 +230,7 @@ async fn extended_data_is_of_an_application_that_is_registered_and_short_enough(
 }
 
 #[tokio::test]
-async fn the_view_that_opens_holds_the_whole_drawing() {
+async fn initial_view_holds_whole_drawing() {
     for pairs in drawings().await {
         let header = section(&pairs, "HEADER");
         let corner = header.iter().position(|pair| pair.1 == "$EXTMAX").unwrap();

@@ -1,4 +1,4 @@
-//! Each endpoint reads only what it needs, requires only that, and caches by only that.
+//! Each endpoint requires, reads and caches by only the fields that it needs.
 
 use serde_json::{Value, json};
 
@@ -11,7 +11,7 @@ async fn etag(path: &str, document: &Value) -> String {
     answer.etag().to_owned()
 }
 
-/// Values that no drive or load can have, in the parts of a document that an endpoint does not read.
+/// Returns impossible values for parts of a document that an endpoint does not read.
 fn impossible(part: &str) -> Value {
     match part {
         "materials" => json!({ "ring": { "youngs_modulus_gpa": -210.0, "poissons_ratio": 7.0 } }),
@@ -30,7 +30,7 @@ const READS: [(&str, &[&str], &[&str]); 3] = [
 ];
 
 #[tokio::test]
-async fn what_an_endpoint_does_not_read_changes_neither_its_answer_nor_its_entity_tag() {
+async fn unread_fields_change_neither_answer_nor_tag() {
     for (path, _, unread) in READS {
         let service = Service::new();
         let first = service.post(path, &spelled_out()).await;
@@ -48,7 +48,7 @@ async fn what_an_endpoint_does_not_read_changes_neither_its_answer_nor_its_entit
 }
 
 #[tokio::test]
-async fn what_an_endpoint_reads_must_be_possible() {
+async fn fields_that_endpoint_reads_must_be_possible() {
     for (path, read, _) in READS {
         for part in read {
             let document = with(&spelled_out(), &format!("/{part}"), impossible(part));
@@ -58,7 +58,7 @@ async fn what_an_endpoint_reads_must_be_possible() {
 }
 
 #[tokio::test]
-async fn the_drive_is_all_that_geometry_and_coincidence_degree_require() {
+async fn geometry_and_coincidence_degree_need_only_drive() {
     let document = json!({ "drive": spelled_out()["drive"] });
     for path in ["/v1/geometry", "/v1/coincidence-degree"] {
         assert_eq!(etag(path, &document).await, etag(path, &spelled_out()).await);
@@ -68,14 +68,14 @@ async fn the_drive_is_all_that_geometry_and_coincidence_degree_require() {
 }
 
 #[tokio::test]
-async fn an_unknown_field_is_refused_even_where_it_would_not_be_read() {
+async fn rejects_unknown_field_in_unread_object() {
     let document = with(&spelled_out(), "/load/torque", json!(20.0));
     let (at, ..) = Service::new().post("/v1/geometry", &document).await.faulty_field();
     assert_eq!(at, "/load/torque");
 }
 
 #[tokio::test]
-async fn geometry_depends_on_every_field_of_its_profile() {
+async fn geometry_depends_on_its_profile() {
     let first = etag("/v1/geometry", &spelled_out()).await;
     for (pointer, value) in [("/profile/chord_tolerance_mm", json!(0.002)), ("/profile/extent", json!("full"))] {
         assert_ne!(etag("/v1/geometry", &with(&spelled_out(), pointer, value)).await, first, "{pointer}");
@@ -83,7 +83,7 @@ async fn geometry_depends_on_every_field_of_its_profile() {
 }
 
 #[tokio::test]
-async fn a_sweep_depends_on_everything_but_the_profile() {
+async fn sweep_depends_on_all_but_profile() {
     let first = etag("/v1/sweep", &spelled_out()).await;
     let mut seen = vec![first.clone()];
     for (pointer, value) in [
@@ -119,7 +119,7 @@ async fn a_sweep_depends_on_everything_but_the_profile() {
 }
 
 #[tokio::test]
-async fn endpoints_do_not_answer_for_each_other() {
+async fn endpoints_have_separate_cache_entries() {
     let service = Service::new();
     let mut tags = Vec::new();
     for (path, ..) in READS {
@@ -132,12 +132,12 @@ async fn endpoints_do_not_answer_for_each_other() {
     assert_eq!(tags.len(), 3);
 }
 
-/// The names of the parts of `/v1/design`, and the endpoints that answer them by themselves.
+/// Parts of `/v1/design` with the endpoints that answer each part alone.
 const PARTS: [(&str, &str); 3] =
     [("geometry", "/v1/geometry"), ("coincidence_degree", "/v1/coincidence-degree"), ("sweep", "/v1/sweep")];
 
 #[tokio::test]
-async fn a_design_is_answered_as_a_whole_with_the_bytes_of_its_parts() {
+async fn design_answer_joins_bytes_of_its_parts() {
     let service = Service::new();
     for document in [spelled_out(), service.get("/v1/examples/paper-5.2").await.json()] {
         let whole = service.post("/v1/design", &document).await;
@@ -151,7 +151,7 @@ async fn a_design_is_answered_as_a_whole_with_the_bytes_of_its_parts() {
 }
 
 #[tokio::test]
-async fn where_a_part_of_a_design_has_no_answer_its_problem_stands_in_its_place() {
+async fn failed_part_of_design_has_its_problem() {
     let service = Service::new();
     let unloaded = without(&spelled_out(), "/load");
     let touching = with(&spelled_out(), "/drive/teeth/radius_mm", json!(8.0));
@@ -172,7 +172,7 @@ async fn where_a_part_of_a_design_has_no_answer_its_problem_stands_in_its_place(
 }
 
 #[tokio::test]
-async fn a_design_as_a_whole_depends_on_what_its_parts_depend_on() {
+async fn design_key_depends_on_all_parts() {
     let first = etag("/v1/design", &spelled_out()).await;
     for (pointer, value) in [
         ("/profile/chord_tolerance_mm", json!(0.002)),
@@ -187,14 +187,14 @@ async fn a_design_as_a_whole_depends_on_what_its_parts_depend_on() {
 }
 
 #[tokio::test]
-async fn a_document_of_another_form_is_no_design_in_any_part() {
+async fn malformed_document_fails_whole_design() {
     let document = with(&spelled_out(), "/load/torque", json!(20.0));
     let (at, ..) = Service::new().post("/v1/design", &document).await.faulty_field();
     assert_eq!(at, "/load/torque");
 }
 
 #[tokio::test]
-async fn a_sweep_says_the_load_at_both_shafts_and_whether_teeth_enter_under_it() {
+async fn sweep_states_both_torques_and_entry_under_load() {
     let service = Service::new();
     for (example, enters_under_load) in [("paper-5.1", false), ("paper-5.2", true), ("paper-5.2-bored", true)] {
         let design = service.get(&format!("/v1/examples/{example}")).await.json();
@@ -203,14 +203,14 @@ async fn a_sweep_says_the_load_at_both_shafts_and_whether_teeth_enter_under_it()
         let input_nm = design["load"]["input_torque_nm"].as_f64().unwrap();
         assert_eq!(sweep["load"], json!({ "input_torque_nm": input_nm, "output_torque_nm": input_nm * ratio }));
         assert_eq!(sweep["enters_under_load"], enters_under_load, "{example}");
-        // Given at the other shaft it is the same load.
+        // The same load may be given at the other shaft.
         let turned = with(&design, "/load", json!({ "output_torque_nm": input_nm * ratio }));
         assert_eq!(service.post("/v1/sweep", &turned).await.json()["load"], sweep["load"]);
     }
 }
 
 #[tokio::test]
-async fn the_geometry_says_which_wall_holds_a_tooth_and_what_stands_between_two_slots() {
+async fn geometry_states_holding_wall_and_slot_wall() {
     let service = Service::new();
     let design = spelled_out();
     let carrier = |answer: &Value| answer["carrier"].clone();
@@ -219,7 +219,7 @@ async fn the_geometry_says_which_wall_holds_a_tooth_and_what_stands_between_two_
     let backward = carrier(&service.post("/v1/geometry", &without(&against, "/drive/ring/tip_radius_mm")).await.json());
     assert_eq!((&forward["loaded_wall"], &backward["loaded_wall"]), (&json!("leading"), &json!("trailing")));
     assert_eq!(forward["finger"]["corners"]["x_mm"].as_array().unwrap().len(), 4);
-    // Slots that run into each other leave a pointed finger, wider ones none.
+    // Slots that run into each other leave a pointed finger, and wider slots none.
     let of_radius = |radius_mm: f64| {
         with(&without(&design, "/drive/ring/tip_radius_mm"), "/drive/teeth/radius_mm", json!(radius_mm))
     };

@@ -1,4 +1,4 @@
-//! Who may come in, and how much of a connection anyone gets.
+//! Keys, settings and host names.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -10,7 +10,7 @@ use crate::asking::{ENDPOINTS, LIMITS, Question, Service, ask_at};
 use crate::designs::shortest;
 use crate::serving::Process;
 
-/// A key, and its line of a keys file, as the command line makes them.
+/// Makes a key and its line of a keys file with the command line.
 pub(crate) fn new_key(name: &str) -> (String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_toothwave")).args(["new-key", name]).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
@@ -18,7 +18,7 @@ pub(crate) fn new_key(name: &str) -> (String, String) {
     (values.next().unwrap(), values.next().unwrap())
 }
 
-/// A keys file that is removed with the test.
+/// A temporary keys file.
 pub(crate) struct KeysFile(PathBuf);
 
 impl KeysFile {
@@ -44,11 +44,11 @@ impl Drop for KeysFile {
 const OTHERS: [&str; 5] = ["/v1/limits", "/v1/examples", "/metrics", "/openapi.json", "/docs/"];
 
 #[tokio::test]
-async fn with_keys_every_path_but_health_and_the_page_wants_one() {
+async fn keys_guard_all_but_health_and_page() {
     let (key, line) = new_key("a team");
     let file = KeysFile::of(&line);
     let service = Service::with(LIMITS, &["--keys-file", file.path()]);
-    // The page asks for the key itself; it holds nothing secret.
+    // The page asks for the key itself and holds nothing secret.
     for path in ["/health/live", "/health/ready", "/", "/page/main.js"] {
         assert_eq!(service.get(path).await.status, 200);
     }
@@ -63,14 +63,14 @@ async fn with_keys_every_path_but_health_and_the_page_wants_one() {
         let open = service.ask(&question.with("authorization", &format!("bearer {key}"))).await;
         assert_eq!(open.status, 200);
     }
-    // Nor does it tell strangers what stands where.
+    // An unauthorized client cannot learn which paths exist.
     for path in ["/nowhere", "/page", "/pages/main.js"] {
         service.get(path).await.refused(401, "unauthorized");
     }
 }
 
 #[test]
-fn wrong_setting_ends_with_its_name() {
+fn wrong_setting_is_named_at_exit() {
     for (variable, value, named) in [
         ("TOOTHWAVE_MAX_STATES", "many", "max-states"),
         ("TOOTHWAVE_MAX_CONCURRENT_SOLVES", "0", "max-concurrent-solves"),
@@ -86,7 +86,7 @@ fn wrong_setting_ends_with_its_name() {
 }
 
 #[test]
-fn a_fault_in_the_settings_is_none_of_another_command() {
+fn wrong_setting_breaks_no_other_command() {
     let command = |arguments: &[&str]| {
         Command::new(env!("CARGO_BIN_EXE_toothwave"))
             .args(arguments)
@@ -131,7 +131,7 @@ fn local_service_rejects_foreign_host_names() {
         assert_eq!(status(&format!("host: {host}\r\n")).0, "200", "{host}");
     }
     let strangers = ["rebound.example", "localhost.example:8080", "10.0.0.1", "127.0.0.1.example", ""];
-    // None of these is a name.
+    // None of these is a valid name.
     let malformed =
         ["[::1]rebound.example", "rebound.example@127.0.0.1", "127.0.0.1:x", "localhost\r\nhost: rebound.example"];
     for host in strangers.into_iter().chain(malformed) {

@@ -1,4 +1,4 @@
-//! The ready design documents.
+//! Example design documents.
 
 use serde_json::{Value, json};
 
@@ -11,14 +11,14 @@ async fn names(service: &Service) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn every_material_names_the_source_of_its_numbers_and_can_stand_in_a_document() {
+async fn every_material_has_source_and_fits_a_document() {
     let service = Service::new();
     let found = service.get("/v1/materials").await.found();
     let materials = found["materials"].as_array().unwrap();
     assert!(materials.len() >= 4);
     for material in materials {
         assert!(material["elasticity_source"].as_str().unwrap().len() > 20);
-        // A stress stands beside its source or not at all.
+        // A stress always has its source.
         assert_eq!(material.get("allowable_stress_mpa").is_some(), material.get("allowable_stress_source").is_some());
         let elastic = json!({
             "youngs_modulus_gpa": material["youngs_modulus_gpa"], "poissons_ratio": material["poissons_ratio"]
@@ -29,7 +29,7 @@ async fn every_material_names_the_source_of_its_numbers_and_can_stand_in_a_docum
 }
 
 #[tokio::test]
-async fn the_papers_cases_are_among_the_examples() {
+async fn examples_include_the_papers_cases() {
     let names = names(&Service::new()).await;
     for name in ["paper-5.1", "paper-5.2", "paper-5.2-bored"] {
         assert!(names.contains(&name.to_owned()), "{names:?}");
@@ -37,7 +37,7 @@ async fn the_papers_cases_are_among_the_examples() {
 }
 
 #[tokio::test]
-async fn an_example_stands_where_the_list_says() {
+async fn each_listed_example_exists() {
     let service = Service::new();
     let found = service.get("/v1/examples").await.found();
     for example in found["examples"].as_array().unwrap() {
@@ -48,7 +48,7 @@ async fn an_example_stands_where_the_list_says() {
 }
 
 #[tokio::test]
-async fn an_example_as_it_is_served_is_answered_by_every_endpoint_that_it_has_data_for() {
+async fn every_endpoint_answers_its_examples() {
     let service = Service::new();
     for name in names(&service).await {
         let example = service.get(&format!("/v1/examples/{name}")).await;
@@ -65,7 +65,7 @@ async fn an_example_as_it_is_served_is_answered_by_every_endpoint_that_it_has_da
 }
 
 #[tokio::test]
-async fn an_example_is_the_file_of_its_name() {
+async fn served_example_equals_its_file() {
     let service = Service::new();
     for name in names(&service).await {
         let file = format!("{}/../../examples/{name}.json", env!("CARGO_MANIFEST_DIR"));
@@ -74,7 +74,7 @@ async fn an_example_is_the_file_of_its_name() {
 }
 
 #[tokio::test]
-async fn every_kind_of_wave_generator_and_every_shape_of_teeth_has_an_example_without_a_warning() {
+async fn every_kind_has_an_example_without_warning() {
     let service = Service::new();
     let (mut kinds, mut shapes) = (Vec::new(), Vec::new());
     for name in names(&service).await {
@@ -101,7 +101,7 @@ async fn every_kind_of_wave_generator_and_every_shape_of_teeth_has_an_example_wi
 }
 
 #[tokio::test]
-async fn an_unknown_example_is_answered_with_the_known_ones() {
+async fn unknown_example_lists_known_ones() {
     let service = Service::new();
     let problem = service.get("/v1/examples/paper-5.3").await.refused(404, "not_found");
     for name in names(&service).await {

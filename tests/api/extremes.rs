@@ -1,15 +1,15 @@
-//! Drives that nobody would draw: whatever the numbers, the service answers with numbers or says what is wrong.
+//! Random extreme drives. The service answers with finite numbers or a reason.
 
 use serde_json::{Value, json};
 
 use crate::asking::{ENDPOINTS, LIMITS, Limits, Service};
 use crate::designs::{fixed, pointers};
 
-/// Numbers without a pattern, the same ones every time (Knuth's MMIX generator).
+/// A reproducible random generator (Knuth's MMIX).
 struct Dice(u64);
 
 impl Dice {
-    /// From 0 to 1.
+    /// Returns a number from 0 to 1.
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
@@ -19,7 +19,7 @@ impl Dice {
         low + (high - low) * self.unit()
     }
 
-    /// Between two powers of ten, all orders of magnitude alike.
+    /// Returns a number between two powers of ten, uniform in its logarithm.
     fn order(&mut self, low: f64, high: f64) -> f64 {
         10.0_f64.powf(self.between(low, high))
     }
@@ -34,7 +34,7 @@ impl Dice {
         json!({ "youngs_modulus_gpa": self.order(-3.0, 5.0), "poissons_ratio": self.between(-0.999_999, 0.499_999) })
     }
 
-    /// A document whose every number is in its range; whether they fit each other is another matter.
+    /// Returns a document with every number within its range. The numbers need not fit each other.
     fn document(&mut self) -> Value {
         let semi_major_mm = self.order(-5.9, 6.0);
         let semi_minor_mm = (semi_major_mm * (1.0 - self.order(-14.0, 0.0))).max(1e-6);
@@ -69,7 +69,7 @@ impl Dice {
 }
 
 #[tokio::test]
-async fn whatever_the_numbers_there_is_an_answer_in_numbers_or_a_reason() {
+async fn any_numbers_get_finite_answer_or_reason() {
     let service = Service::within(Limits { max_states: 5_000, cache_max_bytes: 0, ..LIMITS });
     let mut dice = Dice(2013);
     let mut answered = 0;

@@ -1,4 +1,4 @@
-//! What a designer is told about drives that can exist.
+//! Findings about possible drives.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use crate::asking::{ENDPOINTS, Service};
 use crate::codes::{codes_of, finding_codes, words};
 use crate::designs::{bored, of_the_paper, shortest, spelled_out, undercut, with, without};
 
-/// The findings of an endpoint, each well formed.
+/// Returns the findings of an endpoint and checks their form.
 async fn findings_at(path: &str, document: &Value) -> Vec<Value> {
     let found = Service::new().post(path, document).await.found();
     let findings = found["findings"].as_array().unwrap().clone();
@@ -42,7 +42,7 @@ async fn findings(document: &Value) -> Vec<Value> {
     findings_at("/v1/sweep", document).await
 }
 
-/// The one finding of its kind.
+/// Returns the only finding with this code.
 async fn finding(document: &Value, code: &str) -> Value {
     let mut findings = findings(document).await;
     findings.retain(|finding| finding["code"] == code);
@@ -59,7 +59,7 @@ fn assert_numbers(finding: &Value, value: f64, limit: f64, unit: &str) {
 }
 
 #[tokio::test]
-async fn undercut_is_a_warning_with_the_critical_radius() {
+async fn undercut_warning_states_critical_radius() {
     let finding = finding(&undercut(), "undercut").await;
     let found = Service::new().post("/v1/geometry", &undercut()).await.found();
     assert_numbers(&finding, 1.5, found["undercut"]["critical_tooth_radius_mm"].as_f64().unwrap(), "mm");
@@ -69,19 +69,19 @@ async fn undercut_is_a_warning_with_the_critical_radius() {
 }
 
 #[tokio::test]
-async fn undercut_that_a_bore_takes_away_is_no_more_than_information() {
+async fn undercut_removed_by_bore_is_information() {
     assert_eq!(finding(&bored(), "undercut").await["severity"], "info");
 }
 
 #[tokio::test]
-async fn a_bore_that_ends_the_flank_early_is_a_finding_with_the_natural_tip() {
+async fn bore_shortening_flank_states_natural_tip() {
     let natural =
         Service::new().post("/v1/geometry", &undercut()).await.found()["ring"]["tip_radius_mm"].as_f64().unwrap();
     assert_numbers(&finding(&bored(), "bore_shortens_flank").await, 52.8227, natural, "mm");
 }
 
 #[tokio::test]
-async fn a_bore_inside_the_natural_tip_changes_nothing_and_is_a_finding() {
+async fn bore_inside_natural_tip_has_no_effect() {
     let document = with(&spelled_out(), "/drive/ring/tip_radius_mm", json!(65.9));
     let found = finding(&document, "bore_without_effect").await;
     assert_numbers(&found, 65.9, 66.0, "mm");
@@ -91,7 +91,7 @@ async fn a_bore_inside_the_natural_tip_changes_nothing_and_is_a_finding() {
         let mut with_bore = service.post(path, &document).await.found();
         let mut without = service.post(path, &spelled_out()).await.found();
         assert_ne!(with_bore["findings"], without["findings"]);
-        // The hash is one of what was asked.
+        // The hash depends on the document.
         for field in ["findings", "design_hash"] {
             with_bore.as_object_mut().unwrap().remove(field);
             without.as_object_mut().unwrap().remove(field);
@@ -100,7 +100,7 @@ async fn a_bore_inside_the_natural_tip_changes_nothing_and_is_a_finding() {
     }
 }
 
-/// Case 5.1 with thirty teeth, every fifth slot filled: one or two teeth in each zone.
+/// Returns case 5.1 with thirty teeth and every fifth slot filled: one or two teeth in each zone.
 fn sparse() -> Value {
     let document =
         with(&shortest(), "/drive/teeth", json!({ "count": 30, "installed": 6, "radius_mm": 5.0, "width_mm": 15.0 }));
@@ -114,25 +114,25 @@ async fn few_teeth_in_mesh_are_a_warning() {
     assert_eq!(finding["severity"], "warning");
 }
 
-/// Case 5.1 with teeth so thick that the slots' walls are not.
+/// Returns case 5.1 with thick teeth, so that slot walls are thin.
 fn thick() -> Value {
     with(&shortest(), "/drive/teeth/radius_mm", json!(5.5))
 }
 
 #[tokio::test]
-async fn a_thin_wall_between_slots_is_a_warning() {
+async fn thin_slot_wall_is_a_warning() {
     let half = std::f64::consts::PI / 28.0;
     let wall = 2.0 * ((58.0_f64 * 58.0 - 5.5 * 5.5).sqrt() * half.sin() - 5.5 * half.cos());
     assert_numbers(&finding(&thick(), "thin_slot_wall").await, wall, 2.75, "mm");
 }
 
-/// Case 5.1 with teeth thinner than the cam's stroke, or as thick, or a little thicker.
+/// Returns case 5.1 with teeth about as thick as the cam's stroke.
 fn thin(radius_mm: f64) -> Value {
     with(&shortest(), "/drive/teeth/radius_mm", json!(radius_mm))
 }
 
 #[tokio::test]
-async fn a_loaded_tooth_that_leaves_the_carriers_annulus_is_a_warning_for_each_edge() {
+async fn loaded_tooth_beyond_carrier_warns_for_each_edge() {
     // Centres run from b + r to a + r; the annulus reaches from a to b + 2r.
     let findings = findings(&thin(1.9)).await;
     let beyond: Vec<_> = findings.iter().filter(|finding| finding["code"] == "tooth_beyond_carrier").collect();
@@ -143,7 +143,7 @@ async fn a_loaded_tooth_that_leaves_the_carriers_annulus_is_a_warning_for_each_e
     assert!(!codes_of(&stays).contains(&"tooth_beyond_carrier".to_owned()));
 }
 
-/// A deep ellipse under many small teeth.
+/// Returns a deep ellipse with many small teeth.
 fn steep() -> Value {
     json!({
         "drive": {
@@ -156,23 +156,23 @@ fn steep() -> Value {
 }
 
 #[tokio::test]
-async fn a_steep_ring_flank_is_a_warning_with_its_pressure_angle() {
+async fn steep_ring_flank_warning_states_pressure_angle() {
     let finding = finding(&steep(), "steep_ring_flank").await;
     let geometry = Service::new().post("/v1/geometry", &steep()).await.found();
     assert_numbers(&finding, geometry["ring"]["pressure_angle_max_deg"].as_f64().unwrap(), 70.0, "deg");
     assert!(finding["value"].as_f64().unwrap() > 70.0);
 }
 
-/// Case 5.1 under a hundred times its torque: ten times its stresses, all beyond 1500 MPa.
+/// Returns case 5.1 under a hundred times its torque: stresses are ten times larger, all above 1500 MPa.
 fn overloaded() -> Value {
     with(&with(&shortest(), "/model", of_the_paper()), "/load/input_torque_nm", json!(2000.0))
 }
 
 #[tokio::test]
-async fn a_stress_above_the_fatigue_limit_is_a_warning_for_each_contact() {
+async fn stress_above_fatigue_limit_warns_for_each_contact() {
     let found = Service::new().post("/v1/sweep", &overloaded()).await.found();
     let mut findings = findings(&overloaded()).await;
-    // So heavy a load also winds the drive up beyond what the model holds for.
+    // This load also gives a wind-up beyond the model.
     findings.retain(|finding| finding["code"] != "wind_up_beyond_model");
     assert_eq!(findings.len(), 3, "{findings:?}");
     for (finding, contact) in findings.iter().zip(["wave_generator", "ring", "carrier"]) {
@@ -182,14 +182,14 @@ async fn a_stress_above_the_fatigue_limit_is_a_warning_for_each_contact() {
     }
 }
 
-/// Case 5.1 with gaps of a millimetre at the carrier.
+/// Returns case 5.1 with gaps of a millimetre at the carrier.
 fn loose() -> Value {
     let document = with(&shortest(), "/model", json!({ "compatibility": "virtual_work" }));
     with(&document, "/parts", json!({ "carrier": { "clearance_um": 1000.0 } }))
 }
 
 #[tokio::test]
-async fn a_wind_up_of_more_than_a_tenth_of_the_period_is_a_warning() {
+async fn wind_up_above_tenth_of_period_warns() {
     let document = with(&loose(), "/sweep", json!({ "wind_up": true }));
     let found = Service::new().post("/v1/sweep", &document).await.found();
     let wind_up = found["wind_up"]["wind_up_deg"].as_array().unwrap();
@@ -202,7 +202,7 @@ async fn a_wind_up_of_more_than_a_tenth_of_the_period_is_a_warning() {
 }
 
 #[tokio::test]
-async fn a_sweep_tells_how_many_teeth_mesh_and_how_many_of_them_carry() {
+async fn sweep_counts_meshing_and_loaded_teeth() {
     let found = Service::new().post("/v1/sweep", &loose()).await.found();
     assert_eq!(found["teeth_in_mesh_per_zone"], json!({ "min": 7, "max": 7 }));
     let loaded = found["states"]["loaded"].as_array().unwrap();
@@ -222,14 +222,14 @@ async fn a_sweep_tells_how_many_teeth_mesh_and_how_many_of_them_carry() {
 }
 
 #[tokio::test]
-async fn stresses_are_no_finding_where_no_load_is_read() {
+async fn unread_load_gives_no_stress_finding() {
     for path in ["/v1/geometry", "/v1/coincidence-degree"] {
         assert!(findings_at(path, &overloaded()).await.is_empty());
     }
 }
 
 #[tokio::test]
-async fn all_endpoints_tell_the_same_of_the_drive_itself() {
+async fn all_endpoints_report_same_findings_of_drive() {
     for document in [undercut(), bored(), sparse(), thick(), thin(1.9), steep()] {
         let of_geometry = findings_at("/v1/geometry", &document).await;
         assert_eq!(findings_at("/v1/coincidence-degree", &document).await, of_geometry);
@@ -238,14 +238,14 @@ async fn all_endpoints_tell_the_same_of_the_drive_itself() {
     }
 }
 
-/// The findings of an assembly beyond those of its drive.
+/// Returns the findings of an assembly without those of its drive.
 async fn findings_of_parts(document: &Value) -> Vec<Value> {
     let of_drive = findings_at("/v1/geometry", document).await.len();
     findings_at("/v1/drawings/assembly", document).await.split_off(of_drive)
 }
 
 #[tokio::test]
-async fn a_carrier_as_drawn_that_does_not_hold_the_teeth_is_a_warning_for_each_edge() {
+async fn drawn_carrier_losing_teeth_warns_for_each_edge() {
     // Centres run from b + r to a + r; a wall stands r beside the slot's middle.
     let along = |radius_mm: f64| (radius_mm * radius_mm - 25.0).sqrt();
     for (radii, edge, expected) in [
@@ -263,9 +263,9 @@ async fn a_carrier_as_drawn_that_does_not_hold_the_teeth_is_a_warning_for_each_e
 }
 
 #[tokio::test]
-async fn a_tooth_that_leaves_its_slot_without_load_is_information() {
-    // Case 5.2 as it is by default. Centres start at b + r = 50.8 mm, where the undercut flank is long past; the carrier starts a tenth
-    // of the annulus outside the cam.
+async fn tooth_leaving_slot_unloaded_is_information() {
+    // Case 5.2 by default: centres start at b + r = 50.8 mm, far past the undercut flank. The carrier starts a tenth of
+    // the annulus outside the cam.
     let found = Service::new().post("/v1/geometry", &undercut()).await.found();
     let inner_mm = 50.7 + 0.1 * (found["ring"]["tip_radius_mm"].as_f64().unwrap() - 50.7);
     let findings = findings_of_parts(&undercut()).await;
@@ -274,14 +274,14 @@ async fn a_tooth_that_leaves_its_slot_without_load_is_information() {
     assert_numbers(finding, 50.8, (inner_mm * inner_mm - 2.25).sqrt(), "mm");
 }
 
-/// Case 5.1 with a rim and a cam's wall of a micrometre.
+/// Returns case 5.1 with a rim and a cam wall of one micrometre.
 fn thin_walls() -> Value {
     let parts = json!({ "ring": { "outer_radius_mm": 68.001 }, "wave_generator": { "bore_radius_mm": 55.999 } });
     with(&shortest(), "/parts", parts)
 }
 
 #[tokio::test]
-async fn rims_and_walls_of_a_micrometre_are_warnings() {
+async fn micrometre_rims_and_walls_are_warnings() {
     let findings = findings_of_parts(&thin_walls()).await;
     let [rim, wall] = &findings[..] else { panic!("{findings:?}") };
     for (finding, pointer) in [(rim, "/parts/ring/outer_radius_mm"), (wall, "/parts/wave_generator/bore_radius_mm")] {
@@ -292,15 +292,15 @@ async fn rims_and_walls_of_a_micrometre_are_warnings() {
     assert!(findings_of_parts(&with(&shortest(), "/parts", thick)).await.is_empty());
 }
 
-/// Case 5.1 with a ring whose clearance takes the flank beyond the critical distance.
+/// Returns case 5.1 with a ring clearance that moves the flank beyond the critical distance.
 fn cleared(clearance_um: f64) -> Value {
     let parts = json!({ "ring": { "clearance_um": clearance_um, "outer_radius_mm": 90 } });
     with(&shortest(), "/parts", parts)
 }
 
 #[tokio::test]
-async fn a_clearance_that_itself_undercuts_the_ring_is_a_warning_with_the_distance_from_which_it_does() {
-    // The path of the centres has at its tip the curvature radius that the flank may be away from it.
+async fn clearance_that_undercuts_ring_states_critical_distance() {
+    // At the tip, the path of centres has the critical distance as its radius of curvature.
     let (a, b, r, k) = (58.0_f64, 56.0_f64, 5.0_f64, 13.0_f64);
     let critical_mm = (b + r) / (k * k * (a * a - b * b) / (a * a + b * r) - 1.0);
     let codes = async |clearance_um: f64| codes_of(&findings_of_parts(&cleared(clearance_um)).await);
@@ -313,7 +313,7 @@ async fn a_clearance_that_itself_undercuts_the_ring_is_a_warning_with_the_distan
 }
 
 #[tokio::test]
-async fn what_sets_the_ring_back_until_it_is_undercut_is_pointed_at() {
+async fn undercut_by_offset_points_to_its_fields() {
     let modified = |document: &Value| with(document, "/modification", json!({ "ring_equidistant_um": 3000 }));
     let (clearance, equidistant, radius) =
         ("/parts/ring/clearance_um", "/modification/ring_equidistant_um", "/drive/teeth/radius_mm");
@@ -328,12 +328,12 @@ async fn what_sets_the_ring_back_until_it_is_undercut_is_pointed_at() {
 }
 
 #[tokio::test]
-async fn parts_that_are_not_drawn_are_not_judged() {
+async fn undrawn_parts_have_no_findings() {
     assert!(findings_at("/v1/drawings/tooth", &thin_walls()).await.is_empty());
     assert_eq!(findings_at("/v1/drawings/ring", &thin_walls()).await.len(), 1);
 }
 
-/// Case 5.1 with the same friction everywhere, on a plain cam.
+/// Returns case 5.1 with a plain cam and equal friction everywhere.
 fn rubbing(coefficient: f64) -> Value {
     let contact = json!({ "coefficient": coefficient });
     let cam = json!({ "kind": "plain", "coefficient": coefficient });
@@ -341,7 +341,7 @@ fn rubbing(coefficient: f64) -> Value {
 }
 
 #[tokio::test]
-async fn friction_beyond_what_was_measured_is_a_warning_with_the_end_of_the_range() {
+async fn friction_beyond_measured_range_states_its_end() {
     let along = finding(&rubbing(0.06), "friction_beyond_measured").await;
     assert_numbers(&along, 0.06, 0.05, "");
     assert_eq!(along["severity"], "warning");
@@ -352,19 +352,19 @@ async fn friction_beyond_what_was_measured_is_a_warning_with_the_end_of_the_rang
 }
 
 #[tokio::test]
-async fn an_efficiency_that_may_be_far_off_is_information_with_its_error() {
+async fn uncertain_efficiency_is_information_with_its_error() {
     let found = Service::new().post("/v1/sweep", &rubbing(0.03)).await.found();
     let losses = &found["losses"];
     let share = 1.0 / losses["efficiency"]["ring_fixed"].as_f64().unwrap() - 1.0;
     let finding = finding(&rubbing(0.03), "efficiency_uncertain").await;
-    // On a plain cam ten times the coefficient of what is lost over what comes out.
+    // Plain cam: ten times the coefficient of the losses over the output.
     assert_numbers(&finding, 10.0 * 0.03 * share, 0.05, "");
     assert_numbers(&finding, losses["efficiency_error"].as_f64().unwrap(), 0.05, "");
     assert_eq!(finding["severity"], "info");
     assert!(!codes_of(&findings(&rubbing(0.005)).await).contains(&"efficiency_uncertain".to_owned()));
 }
 
-/// An eccentric drive on a bearing of this rating.
+/// Returns an eccentric drive on a bearing of this rating.
 fn on_a_bearing(rating_n: f64, load: &Value) -> Value {
     let contact = json!({ "coefficient": 0.02 });
     let bearing = json!({
@@ -382,7 +382,7 @@ fn on_a_bearing(rating_n: f64, load: &Value) -> Value {
 }
 
 #[tokio::test]
-async fn a_bearing_that_bears_more_than_half_its_rating_is_a_warning_as_its_life_is_promised_up_to_there() {
+async fn bearing_above_half_rating_is_a_warning() {
     const CODE: &str = "bearing_load_above_half_rating";
     let single = |torque_nm: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1500.0 });
     let bearing = |found: &Value| found["losses"]["bearing"].clone();
@@ -394,7 +394,7 @@ async fn a_bearing_that_bears_more_than_half_its_rating_is_a_warning_as_its_life
     assert_numbers(&overloaded, load_n, 0.999_999_5 * load_n, "N");
     assert_eq!(overloaded["severity"], "warning");
     assert!(!codes_of(&findings(&on_a_bearing(2.000_001 * load_n, &single(2.0))).await).contains(&CODE.to_owned()));
-    // A duty whose mean load is below half the rating, and one of whose points is not.
+    // The duty's mean load is below half the rating, but one point is above.
     let point = |torque_nm: f64, share: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1500.0, "share_of_time": share });
     let duty = on_a_bearing(1.9 * load_n, &json!({ "duty": [point(0.2, 0.9), point(2.0, 0.1)] }));
     let mean_n = bearing(&Service::new().post("/v1/sweep", &duty).await.found())["mean_load_n"].as_f64().unwrap();
@@ -402,13 +402,13 @@ async fn a_bearing_that_bears_more_than_half_its_rating_is_a_warning_as_its_life
     assert_numbers(&finding(&duty, CODE).await, load_n, 0.95 * load_n, "N");
 }
 
-/// Case 5.1 with stresses that its contacts may have.
+/// Returns case 5.1 with these allowable stresses.
 fn limited(allowable: Value) -> Value {
     with(&shortest(), "/load/allowable_stress_mpa", allowable)
 }
 
 #[tokio::test]
-async fn a_stress_above_the_allowable_one_is_a_warning_for_each_contact_with_its_own() {
+async fn stress_above_allowable_warns_for_each_contact() {
     let peaks = Service::new().post("/v1/sweep", &shortest()).await.found()["peaks"].clone();
     let peak = |contact: &str| peaks[contact]["stress_mpa"]["value"].as_f64().unwrap();
     let exceeded = async |allowable: Value| -> Vec<Value> {
@@ -422,20 +422,20 @@ async fn a_stress_above_the_allowable_one_is_a_warning_for_each_contact_with_its
     assert_eq!(finding["severity"], "warning");
     assert!(finding["pointers"].as_array().unwrap().contains(&json!("/materials/ring")));
     assert_eq!(exceeded(json!(1.0)).await.len(), 3);
-    // The fatigue limit has a finding of its own, which says the same.
+    // The finding of the fatigue limit covers this one.
     let codes = codes_of(&findings(&with(&overloaded(), "/load/allowable_stress_mpa", json!(1500.0))).await);
     assert!(
         !codes.contains(&"stress_above_allowable".to_owned())
             && codes.contains(&"stress_above_fatigue_limit".to_owned())
     );
-    // What a contact bears with a hair to spare, it may: with a stress to reach the sweep goes state by state, and rounds otherwise.
+    // A margin of 1e-12 covers rounding: with an allowable stress the sweep goes state by state.
     let hair = 1.0 + 1e-12;
     let just = json!({ "wave_generator": hair * peak("wave_generator"), "ring": hair * peak("ring"), "carrier": hair * peak("carrier") });
     assert!(exceeded(just).await.is_empty());
 }
 
 #[tokio::test]
-async fn projection_on_a_steep_flank_is_information_and_virtual_work_is_not() {
+async fn steep_flank_is_information_under_projection_only() {
     let document = with(&undercut(), "/model", of_the_paper());
     let geometry = Service::new().post("/v1/geometry", &document).await.found();
     let found = finding(&document, "projection_on_steep_flank").await;
@@ -447,7 +447,7 @@ async fn projection_on_a_steep_flank_is_information_and_virtual_work_is_not() {
 }
 
 #[tokio::test]
-async fn projection_with_a_gap_is_a_warning_and_virtual_work_is_not() {
+async fn gap_is_a_warning_under_projection_only() {
     let gap = |document: &Value| {
         with(document, "/parts", json!({ "ring": { "clearance_um": 4.0 }, "carrier": { "clearance_um": 2.5 } }))
     };
@@ -459,12 +459,12 @@ async fn projection_with_a_gap_is_a_warning_and_virtual_work_is_not() {
     }
 }
 
-/// Case 5.1 under the default model, its parts held so.
+/// Returns case 5.1 under the default model with these parts.
 fn held(parts: Value) -> Value {
     with(&shortest(), "/parts", parts)
 }
 
-/// The estimate of one kind in a sweep's answer.
+/// Returns one compliance estimate of a sweep's answer.
 async fn estimate(document: &Value, backing: &str) -> Value {
     let found = Service::new().post("/v1/sweep", document).await.found();
     let estimates = found["series_compliance_estimates"].as_array().unwrap();
@@ -472,7 +472,7 @@ async fn estimate(document: &Value, backing: &str) -> Value {
 }
 
 #[tokio::test]
-async fn fingers_held_at_one_end_and_a_free_rim_are_warnings_with_their_estimated_share() {
+async fn slender_fingers_and_soft_rim_state_estimated_share() {
     for (parts, backing, code, contact) in [
         (json!({ "carrier": { "fingers": "held_at_one_end" } }), "finger_at_one_end", "slender_fingers", "carrier"),
         (json!({ "ring": { "rim": "free" } }), "free_rim", "soft_rim", "ring"),
@@ -483,19 +483,19 @@ async fn fingers_held_at_one_end_and_a_free_rim_are_warnings_with_their_estimate
         let found = finding(&document, code).await;
         assert_numbers(&found, estimate["share"].as_f64().unwrap(), 0.2, "");
         assert_eq!(found["severity"], "warning");
-        // Taken over into the design it is in the forces, and no longer left out.
+        // A compliance copied into the design is part of the forces.
         let series = json!({ contact: estimate["compliance_mm_per_n"] });
         let taken = with(&document, "/model", json!({ "series_compliance_mm_per_n": series }));
         assert!(!codes_of(&findings(&taken).await).contains(&code.to_owned()));
     }
-    // Held at both ends, those of case 5.2 are slender still; those of case 5.1 are not.
+    // With both ends held, the fingers of case 5.2 are still slender and those of case 5.1 are not.
     assert_eq!(finding(&undercut(), "slender_fingers").await["severity"], "info");
     for parts in [json!({}), json!({ "carrier": { "fingers": "held_at_both_ends" }, "ring": { "rim": "housed" } })] {
         assert!(findings(&held(parts)).await.is_empty());
     }
 }
 
-/// Balls of 3 mm around an eccentric circle, in grooves of this radius everywhere.
+/// Returns a drive with balls of 3 mm around an eccentric circle, in equal grooves.
 fn grooved(groove_radius_mm: f64) -> Value {
     let grooves = json!({ "wave_generator": groove_radius_mm, "ring": groove_radius_mm, "carrier": groove_radius_mm });
     let teeth = json!({ "shape": "ball", "count": 16, "radius_mm": 3.0, "groove_radius_mm": grooves });
@@ -503,18 +503,17 @@ fn grooved(groove_radius_mm: f64) -> Value {
     json!({ "drive": { "wave_generator": cam, "teeth": teeth, "ring": { "teeth": 17 } }, "load": { "input_torque_nm": 0.3 } })
 }
 
-/// Contacts of 14 mm were answered in grooves for balls of 6 mm, without a word.
 #[tokio::test]
-async fn a_contact_that_is_longer_than_its_groove_is_wide_is_a_warning_at_each_that_is() {
+async fn contact_beyond_groove_warns_at_each_groove() {
     let document = grooved(3.001);
     let peaks = Service::new().post("/v1/sweep", &document).await.found()["peaks"].clone();
     let half_length_mm = |contact: &str| peaks[contact]["half_length_mm"].as_f64().unwrap();
-    // The edges of a groove that is t deep: a chord of its circle.
+    // Width at the edges of a groove of depth t: a chord of its circle.
     let (groove_mm, depth_mm) = (3.001_f64, 1.5_f64);
     let edge_mm = (groove_mm * groove_mm - (groove_mm - depth_mm) * (groove_mm - depth_mm)).sqrt();
     let mut told = findings(&document).await;
     told.retain(|finding| finding["code"] == "contact_beyond_groove");
-    // The slots hold a ball as closely, but with less force.
+    // The slots hold a ball as closely, but with a smaller force.
     assert!(half_length_mm("carrier") < edge_mm && told.len() == 2, "{told:?}");
     for (finding, contact) in told.iter().zip(["wave_generator", "ring"]) {
         assert_numbers(finding, half_length_mm(contact), edge_mm, "mm");
@@ -526,9 +525,9 @@ async fn a_contact_that_is_longer_than_its_groove_is_wide_is_a_warning_at_each_t
     }
 }
 
-/// Of balls' grooves drawings have the path alone: a part that is made as drawn has none.
+/// Drawings show only the path of balls' grooves, so a part made as drawn has no groove.
 #[tokio::test]
-async fn each_groove_that_a_drawing_leaves_out_is_information() {
+async fn each_groove_not_drawn_is_information() {
     let document = grooved(3.1);
     for (part, contacts) in [
         ("ring", vec!["ring"]),
@@ -550,7 +549,7 @@ async fn each_groove_that_a_drawing_leaves_out_is_information() {
 }
 
 #[tokio::test]
-async fn every_kind_of_finding_can_be_met_over_http() {
+async fn every_finding_occurs_over_http() {
     let bore_without_effect = with(&shortest(), "/drive/ring/tip_radius_mm", json!(60.0));
     let linear = with(&spelled_out(), "/sweep", json!({ "wind_up": true }));
     let brass = [
@@ -591,9 +590,9 @@ async fn every_kind_of_finding_can_be_met_over_http() {
     assert_eq!(codes_of(&all), words(&finding_codes()));
 }
 
-/// Findings of an eccentric pointed at the semi-axes of an ellipse and gave advice about one, those of balls at a width.
+/// The fields differ between kinds of wave generators and shapes of teeth.
 #[tokio::test]
-async fn findings_name_fields_that_the_document_has_whatever_its_kind_and_shape() {
+async fn findings_point_to_fields_of_the_document() {
     let cylinders = |count: u32| json!({ "count": count, "installed": count, "radius_mm": 2.0, "width_mm": 12.0 });
     let eccentric = json!({ "kind": "eccentric", "radius_mm": 30.8, "eccentricity_mm": 2.4 });
     let harmonic = json!({ "kind": "harmonic", "lobes": 3, "mean_radius_mm": 48.0, "amplitude_mm": 2.2 });

@@ -1,4 +1,4 @@
-//! What a turn costs: friction in the document, losses in a sweep's answer.
+//! Friction in the document and losses in a sweep's answer.
 
 use std::f64::consts::PI;
 
@@ -9,7 +9,7 @@ use crate::designs::{eccentric, shortest, undercut, with, without};
 
 const CONTACTS: [&str; 3] = ["wave_generator", "ring", "carrier"];
 
-/// Friction with this wave generator, 0.05 at ring and carrier.
+/// Returns friction with this wave generator and 0.05 at ring and carrier.
 pub(crate) fn on(wave_generator: &Value) -> Value {
     json!({ "wave_generator": wave_generator, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.05 } })
 }
@@ -23,7 +23,7 @@ fn on_bearing(kind: &str) -> Value {
     on(&bearing)
 }
 
-/// Case 5.1 by virtual work and the linear law over 40 intervals, as section 10.3 has it, at 1500 revolutions a minute.
+/// Returns case 5.1 by virtual work and the linear law with 40 intervals at 1500 rpm (docs/explanation/theory.md, section 10.3).
 fn case_5_1(friction: Value) -> Value {
     let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "linear" } });
     let document = with(&shortest(), "/model", model);
@@ -51,7 +51,7 @@ fn assert_near(found: f64, expected: f64, relative: f64, what: &str) {
 }
 
 #[tokio::test]
-async fn case_5_1_loses_half_of_its_power_on_a_plain_cam_and_an_eighth_on_a_bearing() {
+async fn case_5_1_loses_known_shares_of_power() {
     let sliding = swept(&case_5_1(plain())).await["losses"].clone();
     assert!((float(&sliding["efficiency"]["ring_fixed"]) - 0.499).abs() < 5e-4, "{}", sliding["efficiency"]);
     assert_eq!(sliding["self_locking"]["ring_fixed"], json!(true));
@@ -59,14 +59,14 @@ async fn case_5_1_loses_half_of_its_power_on_a_plain_cam_and_an_eighth_on_a_bear
     let on_race = swept(&case_5_1(on_bearing("race"))).await["losses"].clone();
     assert!((float(&on_race["efficiency"]["ring_fixed"]) - 0.874).abs() < 5e-4, "{}", on_race["efficiency"]);
     assert_eq!(on_race["self_locking"]["ring_fixed"], json!(false));
-    // A race that does not rub flatters.
+    // Without a rubbing race the estimate is too favourable.
     let rolling = swept(&case_5_1(on_bearing("rolling"))).await["losses"].clone();
     assert!(float(&rolling["efficiency"]["ring_fixed"]) > float(&on_race["efficiency"]["ring_fixed"]));
     assert_eq!(rolling["loss_ratio_by_place"]["wave_generator"], json!(0.0));
 }
 
 #[tokio::test]
-async fn power_in_is_power_out_and_what_is_lost() {
+async fn input_power_equals_output_power_plus_losses() {
     for friction in [plain(), on_bearing("race"), on_bearing("rolling")] {
         let found = swept(&case_5_1(friction)).await;
         let losses = &found["losses"];
@@ -76,13 +76,13 @@ async fn power_in_is_power_out_and_what_is_lost() {
         let lost_w = float(&losses["power_loss_w"]);
         assert_near(in_w, out_w + lost_w, 1e-12, "power in");
         assert_near(float(&losses["efficiency"]["ring_fixed"]), out_w / in_w, 1e-12, "efficiency");
-        // From behind, the power at the output is that of the output's torque and speed.
+        // If back-driven, the input power is that of output torque and speed.
         assert_near(float(&losses["efficiency"]["ring_fixed_back_driven"]) * out_w, out_w - lost_w, 1e-11, "behind");
         for (whole, places) in [("loss_ratio", "loss_ratio_by_place"), ("power_loss_w", "power_loss_by_place_w")] {
             let sum: f64 = losses[places].as_object().unwrap().values().map(float).sum();
             assert_near(sum, float(&losses[whole]), 1e-12, whole);
         }
-        // The same flanks at the same slips, whichever member stands still: 26 ring teeth, 28 of the carrier, two lobes.
+        // Flanks and slips are the same for any fixed member: 26 ring teeth, 28 of the carrier, two lobes.
         let ratio = float(&losses["loss_ratio"]);
         for (fixed, share) in [("ring", 26.0 / 28.0), ("carrier", 1.0), ("wave_generator", 2.0 / 28.0)] {
             let driven = float(&losses["efficiency"][format!("{fixed}_fixed")]);
@@ -94,7 +94,7 @@ async fn power_in_is_power_out_and_what_is_lost() {
 }
 
 #[tokio::test]
-async fn what_is_lost_is_friction_times_the_slips_of_the_states() {
+async fn losses_are_friction_times_slips_of_states() {
     for (kind, friction, of_cam) in [("plain", plain(), 0.03), ("race", on_bearing("race"), 0.05)] {
         let found = swept(&case_5_1(friction)).await;
         let (states, losses) = (&found["states"], &found["losses"]);
@@ -119,7 +119,7 @@ async fn what_is_lost_is_friction_times_the_slips_of_the_states() {
             if kind == "plain" {
                 assert_near(ratio, lost_nmm / 20e3, 1e-12, "loss ratio");
             } else {
-                // The bearing takes the rest.
+                // The rest is lost in the bearing.
                 assert!(ratio > lost_nmm / 20e3 && ratio < 2.0 * lost_nmm / 20e3, "{ratio} {lost_nmm}");
             }
             let driven = float(&losses["by_input_angle"]["efficiency"]["ring_fixed"][at]);
@@ -129,10 +129,10 @@ async fn what_is_lost_is_friction_times_the_slips_of_the_states() {
 }
 
 #[tokio::test]
-async fn pressure_times_velocity_has_its_largest_value_and_its_place() {
+async fn pressure_times_velocity_has_maximum_and_place() {
     let found = swept(&case_5_1(plain())).await;
     let (states, losses) = (&found["states"], &found["losses"]);
-    // Wave generator against carrier, the ring fixed.
+    // Speed of the wave generator against the carrier, with the ring fixed.
     let turning_rad_per_s = 1500.0 * PI / 30.0 * 26.0 / 28.0;
     for contact in CONTACTS {
         let stresses = floats(&states[format!("stress_{contact}_mpa")]);
@@ -149,7 +149,7 @@ async fn pressure_times_velocity_has_its_largest_value_and_its_place() {
             .unwrap();
         assert_near(values[at], most, 1e-12, contact);
     }
-    // Twice as fast is twice as much.
+    // Double speed gives double values.
     let faster = swept(&with(&case_5_1(plain()), "/load/input_speed_rpm", json!(3000.0))).await["losses"].clone();
     let at_ring = |losses: &Value| float(&losses["pressure_velocity_mpa_m_per_s"]["ring"]["value"]);
     assert_near(at_ring(&faster), 2.0 * at_ring(losses), 1e-14, "p·v");
@@ -158,7 +158,7 @@ async fn pressure_times_velocity_has_its_largest_value_and_its_place() {
 }
 
 #[tokio::test]
-async fn nothing_is_computed_of_friction_that_is_left_out_and_no_power_without_a_speed() {
+async fn omitted_friction_computes_nothing() {
     let with_speed = swept(&without(&case_5_1(plain()), "/friction")).await;
     assert!(with_speed.get("losses").is_none());
     let mut without_either = case_5_1(plain());
@@ -170,14 +170,14 @@ async fn nothing_is_computed_of_friction_that_is_left_out_and_no_power_without_a
     for of_speed in ["power_loss_w", "power_loss_by_place_w", "pressure_velocity_mpa_m_per_s"] {
         assert!(with_friction["losses"].get(of_speed).is_none(), "{of_speed}");
     }
-    // Normal forces and the torque at the input stay those without friction.
+    // Normal forces and input torque stay those without friction.
     for field in ["states", "peaks", "load", "checks"] {
         assert_eq!(frictionless[field].take(), with_friction[field], "{field}");
     }
 }
 
 #[tokio::test]
-async fn every_impossible_value_of_friction_is_a_fault_at_its_field() {
+async fn each_impossible_friction_is_reported_at_its_field() {
     let errors = async |document: Value| -> Vec<(String, f64)> {
         let answer = Service::new().post("/v1/sweep", &document).await;
         let problem = answer.refused(422, "impossible_design");
@@ -204,7 +204,7 @@ async fn every_impossible_value_of_friction_is_a_fault_at_its_field() {
     ]
     .map(|(pointer, limit)| (pointer.to_owned(), limit));
     assert_eq!(errors(case_5_1(wrong("race"))).await, expected);
-    // With those of the load and the drive at once.
+    // All faults are reported together with those of load and drive.
     let document = with(&case_5_1(wrong("rolling")), "/load/input_speed_rpm", json!(0.0));
     let document = with(&document, "/drive/teeth/radius_mm", json!(-5.0));
     let found = errors(document).await;
@@ -216,7 +216,7 @@ async fn every_impossible_value_of_friction_is_a_fault_at_its_field() {
 }
 
 #[tokio::test]
-async fn a_fault_of_friction_s_form_is_told_at_its_field() {
+async fn friction_of_wrong_form_is_reported_in_place() {
     for (friction, pointer, code) in [
         (json!({}), "", "missing_field"),
         (on(&json!({ "coefficient": 0.03 })), "/wave_generator", "missing_field"),
@@ -238,14 +238,14 @@ async fn a_fault_of_friction_s_form_is_told_at_its_field() {
 }
 
 #[tokio::test]
-async fn a_bearing_without_a_rubbing_race_asks_for_no_coefficient_and_heeds_none() {
+async fn rolling_bearing_ignores_coefficient() {
     let mut bare = on_bearing("rolling");
     bare["wave_generator"].as_object_mut().unwrap().remove("coefficient");
     assert_eq!(swept(&case_5_1(bare)).await["losses"], swept(&case_5_1(on_bearing("rolling"))).await["losses"]);
 }
 
 #[tokio::test]
-async fn surfaces_without_friction_lose_nothing_and_numbers_stay_numbers() {
+async fn zero_friction_loses_nothing() {
     let nothing = json!({
         "wave_generator": { "kind": "plain", "coefficient": 0.0 }, "ring": { "coefficient": 0 }, "carrier": { "coefficient": 0 }
     });
@@ -258,7 +258,7 @@ async fn surfaces_without_friction_lose_nothing_and_numbers_stay_numbers() {
 }
 
 #[tokio::test]
-async fn a_tooth_with_flats_does_not_roll_and_loses_more_than_a_loose_one() {
+async fn flat_sided_teeth_slip_and_lose_more() {
     let flat = json!({ "shape": "flat_sided", "count": 28, "radius_mm": 5.0, "width_mm": 15.0, "flat_length_mm": 4.0 });
     let loose = swept(&case_5_1(on_bearing("race"))).await["losses"].clone();
     let found = swept(&with(&case_5_1(on_bearing("race")), "/drive/teeth", flat)).await["losses"].clone();
@@ -268,7 +268,7 @@ async fn a_tooth_with_flats_does_not_roll_and_loses_more_than_a_loose_one() {
 }
 
 #[tokio::test]
-async fn columns_of_losses_fit_the_states_at_any_sweep_and_of_unlike_zones() {
+async fn loss_columns_have_length_of_states() {
     let unlike = with(&shortest(), "/drive/teeth/count", json!(27));
     let unlike = with(&unlike, "/drive/ring/teeth", json!(25));
     for document in [undercut(), eccentric(), unlike] {
@@ -293,7 +293,7 @@ async fn columns_of_losses_fit_the_states_at_any_sweep_and_of_unlike_zones() {
 }
 
 #[tokio::test]
-async fn an_eccentric_is_pushed_across_its_eccentricity_by_the_torque_over_it() {
+async fn eccentric_radial_force_is_torque_over_eccentricity() {
     for sweep in [json!({ "samples": 9 }), json!({ "tolerance": 1e-4 })] {
         let found = swept(&with(&eccentric(), "/sweep", sweep)).await;
         let force = &found["radial_force_n"];
@@ -304,7 +304,7 @@ async fn an_eccentric_is_pushed_across_its_eccentricity_by_the_torque_over_it() 
             assert_near(value * direction_deg.to_radians().sin(), -5e3 / 1.2, 1e-9, "across");
         }
     }
-    // Two lobes that are loaded alike balance each other.
+    // Two equally loaded lobes balance each other.
     assert!(swept(&shortest()).await.get("radial_force_n").is_none());
 }
 
@@ -316,19 +316,19 @@ async fn text_of(document: &Value) -> String {
 }
 
 #[tokio::test]
-async fn losses_and_the_radial_force_can_be_read_as_text() {
+async fn text_contains_losses_and_radial_force() {
     let text = text_of(&case_5_1(plain())).await;
     for part in ["ring fixed            49.9", "(locks itself)", "input torque with losses", "power lost", "MPa m/s"] {
         assert!(text.contains(part), "{part} is not in {text}");
     }
     assert!(!text_of(&without(&case_5_1(plain()), "/friction")).await.contains("efficiency"));
     assert!(text_of(&eccentric()).await.contains("largest force on the wave generator"));
-    let text = text_of(&worn(on_bearing("race"))).await;
+    let text = text_of(&with_wear(on_bearing("race"))).await;
     assert!(text.contains("mm/h") && text.contains("all round"), "{text}");
     assert!(text_of(&on_its_bearing("ball")).await.contains("million revolutions"));
 }
 
-fn worn(friction: Value) -> Value {
+fn with_wear(friction: Value) -> Value {
     let rates = json!({ "wave_generator": 1e-6, "ring": 2e-6, "carrier": 3e-6 });
     let mut friction = friction;
     friction["wear_rate_mm3_per_nm"] = rates;
@@ -336,10 +336,10 @@ fn worn(friction: Value) -> Value {
 }
 
 #[tokio::test]
-async fn wear_is_a_depth_an_hour_with_its_place_and_of_a_race_all_round() {
-    let found = swept(&worn(plain())).await;
+async fn wear_is_depth_per_hour_with_place() {
+    let found = swept(&with_wear(plain())).await;
     let wear = found["losses"]["wear_mm_per_hour"].clone();
-    // 120 passes an hour of a slot at one turn a minute: at 1500 turns, a cam against the carrier of 26/28 of that.
+    // A slot has 120 passes an hour at one turn a minute; here 1500 turns, and 26/28 of that against the carrier.
     let (states, slips) = (&found["states"], &found["losses"]["slip_mm_per_rad"]["carrier"]);
     let at = (0..states["tooth"].as_array().unwrap().len())
         .find(|&state| {
@@ -348,7 +348,8 @@ async fn wear_is_a_depth_an_hour_with_its_place_and_of_a_race_all_round() {
         })
         .unwrap();
     let force_n = float(&states["force_carrier_n"][at]);
-    // How far the slot's wall slips under the tooth for each mm that the tooth advances along it, d tan γ a radian: d times the slope of the path.
+    // Slip of the slot's wall per mm of the tooth's advance along it. The advance is d tan γ a radian: d times
+    // the path's slope.
     let d_mm = float(&states["center_radius_mm"][at]);
     let k = 13.0;
     let tan_ring = float(&states["force_carrier_n"][at]) / float(&states["force_ring_n"][at]);
@@ -358,20 +359,20 @@ async fn wear_is_a_depth_an_hour_with_its_place_and_of_a_race_all_round() {
     let slip = float(&slips[at]).abs() / (d_mm * tan_cam);
     let expected = 3e-6 * 1e-3 * force_n / 15.0 * slip * 120.0 * 1500.0 * 26.0 / 28.0;
     assert_near(float(&wear["carrier"]["value"]), expected, 1e-9, "slot");
-    // Twice the rate, twice the depth; no speed, no hour.
-    let doubled = with(&worn(plain()), "/friction/wear_rate_mm3_per_nm/carrier", json!(6e-6));
+    // Double rate gives double depth. Without a speed there is no depth an hour.
+    let doubled = with(&with_wear(plain()), "/friction/wear_rate_mm3_per_nm/carrier", json!(6e-6));
     let doubled = swept(&doubled).await["losses"]["wear_mm_per_hour"].clone();
     assert_near(float(&doubled["carrier"]["value"]), 2.0 * expected, 1e-9, "slot");
     assert_eq!(doubled["wave_generator"], wear["wave_generator"]);
-    let still = swept(&without(&worn(plain()), "/load/input_speed_rpm")).await;
+    let still = swept(&without(&with_wear(plain()), "/load/input_speed_rpm")).await;
     assert!(still["losses"].get("wear_mm_per_hour").is_none());
-    let on_race = swept(&worn(on_bearing("race"))).await["losses"]["wear_mm_per_hour"].clone();
+    let on_race = swept(&with_wear(on_bearing("race"))).await["losses"]["wear_mm_per_hour"].clone();
     assert_eq!(on_race["wave_generator"].as_object().unwrap().keys().collect::<Vec<_>>(), ["value"]);
     assert!(float(&on_race["wave_generator"]["value"]) > 0.0);
     assert!(on_race["carrier"]["position_deg"].is_number());
 }
 
-/// An eccentric drive on its bearing.
+/// Returns an eccentric drive on its bearing.
 fn on_its_bearing(element: &str) -> Value {
     let bearing = json!({
         "kind": "rolling", "bearing_coefficient": 0.0015, "bearing_radius_mm": 25.0,
@@ -381,7 +382,7 @@ fn on_its_bearing(element: &str) -> Value {
 }
 
 #[tokio::test]
-async fn the_bearing_of_an_eccentric_lasts_as_iso_281_says() {
+async fn bearing_life_follows_iso_281() {
     for (element, exponent) in [("ball", 3.0), ("roller", 10.0 / 3.0)] {
         let found = swept(&on_its_bearing(element)).await;
         let bearing = &found["losses"]["bearing"];
@@ -392,14 +393,14 @@ async fn the_bearing_of_an_eccentric_lasts_as_iso_281_says() {
         assert!((least..=most).contains(&load_n), "{least} {load_n} {most}");
         let millions = (9000.0 / load_n).powf(exponent);
         assert_near(float(&bearing["life_million_revolutions"]), millions, 1e-12, "life");
-        // 28 teeth and 27 of the ring; at rest against the carrier the race turns as the wave generator does against it.
+        // 28 teeth and 27 ring teeth. A race at rest against the carrier turns like the wave generator against it.
         let speed_rpm = 1500.0 * 27.0 / 28.0;
         assert_near(float(&bearing["speed_rpm"]), speed_rpm, 1e-12, "speed");
         assert_near(float(&bearing["life_h"]), 1e6 * millions / 60.0 / speed_rpm, 1e-12, "hours");
     }
     let still = swept(&without(&on_its_bearing("ball"), "/load/input_speed_rpm")).await["losses"]["bearing"].clone();
     assert_eq!(still.as_object().unwrap().len(), 2, "{still}");
-    // Half the load, eight times the life, where all forces are in proportion.
+    // Half the load gives eight times the life, because all forces are proportional.
     let linear = json!({ "compatibility": "virtual_work", "stiffness": { "law": "linear" } });
     let whole = with(&on_its_bearing("ball"), "/model", linear);
     let torque = float(&eccentric()["load"]["input_torque_nm"]);
@@ -410,7 +411,7 @@ async fn the_bearing_of_an_eccentric_lasts_as_iso_281_says() {
 }
 
 #[tokio::test]
-async fn a_bearing_without_a_load_across_it_has_no_life() {
+async fn bearing_without_radial_load_has_no_life() {
     let mut friction = on_bearing("race");
     friction["wave_generator"]["bearing_load_rating_n"] = json!(9000.0);
     let problem = Service::new().post("/v1/sweep", &case_5_1(friction)).await.refused(422, "impossible_design");
@@ -419,7 +420,7 @@ async fn a_bearing_without_a_load_across_it_has_no_life() {
     assert_eq!(error["pointer"], "/friction/wave_generator/bearing_load_rating_n");
 }
 
-/// Case 5.1 with a duty, worn.
+/// Returns case 5.1 with a duty and wear.
 fn on_duty(points: &[(f64, f64, f64)], friction: Value) -> Value {
     let points: Vec<_> = points
         .iter()
@@ -427,29 +428,29 @@ fn on_duty(points: &[(f64, f64, f64)], friction: Value) -> Value {
             json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm, "share_of_time": share })
         })
         .collect();
-    with(&worn(friction), "/load", json!({ "duty": points }))
+    with(&with_wear(friction), "/load", json!({ "duty": points }))
 }
 
 const DUTY: [(f64, f64, f64); 3] = [(10.0, 1500.0, 0.5), (40.0, 300.0, 0.3), (20.0, 3000.0, 0.2)];
 
 fn alone(torque_nm: f64, speed_rpm: f64, friction: Value) -> Value {
-    with(&worn(friction), "/load", json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm }))
+    with(&with_wear(friction), "/load", json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm }))
 }
 
-/// A clearance, so that forces are not in proportion to the torque.
+/// Adds a clearance, so that forces are not proportional to the torque.
 fn loose(document: &Value) -> Value {
     with(document, "/parts", json!({ "ring": { "clearance_um": 3.0 } }))
 }
 
 #[tokio::test]
-async fn a_duty_has_the_peaks_of_its_hardest_point_and_the_means_of_all() {
+async fn duty_reports_hardest_peaks_and_overall_means() {
     for friction in [plain(), on_bearing("race")] {
         let found = swept(&loose(&on_duty(&DUTY, friction.clone()))).await;
         let mut points = Vec::new();
         for (torque_nm, speed_rpm, _) in DUTY {
             points.push(swept(&loose(&alone(torque_nm, speed_rpm, friction.clone()))).await);
         }
-        // The second has the largest torque.
+        // The second point has the largest torque.
         for field in ["peaks", "states", "load", "checks", "loaded_teeth_per_zone"] {
             assert_eq!(found[field], points[1][field], "{field}");
         }
@@ -490,7 +491,7 @@ async fn a_duty_has_the_peaks_of_its_hardest_point_and_the_means_of_all() {
 }
 
 #[tokio::test]
-async fn a_duty_of_one_point_is_that_load() {
+async fn duty_of_one_point_equals_that_load() {
     let (mut one, mut other) =
         (swept(&on_duty(&[(20.0, 1500.0, 1.0)], plain())).await, swept(&alone(20.0, 1500.0, plain())).await);
     assert_eq!(one.as_object_mut().unwrap().remove("duty").unwrap()["hardest_point"], 0);
@@ -498,7 +499,7 @@ async fn a_duty_of_one_point_is_that_load() {
 }
 
 #[tokio::test]
-async fn a_duty_uses_up_a_bearings_life_point_by_point() {
+async fn duty_sums_bearing_damage_over_points() {
     let torque_nm = float(&eccentric()["load"]["input_torque_nm"]);
     let points = [(torque_nm, 1500.0, 0.75), (2.0 * torque_nm, 500.0, 0.25)];
     let duty: Vec<_> = points
@@ -522,7 +523,7 @@ async fn a_duty_uses_up_a_bearings_life_point_by_point() {
 }
 
 #[tokio::test]
-async fn without_friction_a_duty_has_peaks_and_points_alone() {
+async fn duty_without_friction_has_only_peaks_and_points() {
     let found = swept(&without(&on_duty(&DUTY, plain()), "/friction")).await;
     assert!(found.get("losses").is_none());
     assert_eq!(found["load"]["input_torque_nm"], 40.0);
@@ -531,7 +532,7 @@ async fn without_friction_a_duty_has_peaks_and_points_alone() {
 }
 
 #[tokio::test]
-async fn a_duty_s_faults_are_told_at_their_places() {
+async fn duty_faults_are_reported_at_their_places() {
     let errors = async |document: Value, code: &str| -> Vec<(String, String)> {
         let problem = Service::new().post("/v1/sweep", &document).await.refused(422, code);
         let errors = problem["errors"].as_array().unwrap().iter();
@@ -566,7 +567,7 @@ async fn a_duty_s_faults_are_told_at_their_places() {
 }
 
 #[tokio::test]
-async fn all_points_of_a_duty_count_towards_the_states_that_may_be() {
+async fn all_duty_points_count_towards_state_limit() {
     let limits = crate::asking::Limits { max_states: 600, ..crate::asking::LIMITS };
     // 40 intervals with 7 teeth.
     let service = Service::within(limits);
@@ -576,7 +577,7 @@ async fn all_points_of_a_duty_count_towards_the_states_that_may_be() {
 }
 
 #[tokio::test]
-async fn an_allowable_stress_is_a_number_or_one_for_each_contact() {
+async fn allowable_stress_is_number_or_one_per_contact() {
     let faulty = async |allowable: Value| {
         let document = with(&shortest(), "/load/allowable_stress_mpa", allowable);
         let problem = Service::new().post("/v1/sweep", &document).await.problem();
@@ -594,7 +595,7 @@ async fn an_allowable_stress_is_a_number_or_one_for_each_contact() {
 }
 
 #[tokio::test]
-async fn the_slips_stand_in_the_csv_behind_the_states() {
+async fn slips_follow_states_in_csv() {
     let unlike = with(&with(&shortest(), "/drive/teeth/count", json!(27)), "/drive/ring/teeth", json!(25));
     for document in [shortest(), loose(&with(&unlike, "/model", json!({ "compatibility": "virtual_work" })))] {
         let csv = async |document: &Value| -> Vec<Vec<String>> {

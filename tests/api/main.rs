@@ -1,4 +1,4 @@
-//! What is true of the service, told by asking it: over HTTP, and on the command line.
+//! Tests of the service over HTTP and on the command line.
 #![allow(
     clippy::float_cmp,
     clippy::unwrap_used,

@@ -1,18 +1,18 @@
-//! Parts made otherwise than conjugate on purpose.
+//! Modified parts.
 
 use serde_json::{Value, json};
 
 use crate::asking::Service;
 use crate::designs::{eccentric, pointers, spelled_out, with};
 
-/// Case 5.1 by virtual work with a modification, wind-up asked for.
+/// Returns case 5.1 by virtual work with a modification and wind-up.
 fn modified(modification: Value) -> Value {
     let model = json!({ "compatibility": "virtual_work", "stiffness": { "law": "palmgren" } });
     let document = with(&with(&spelled_out(), "/model", model), "/sweep", json!({ "wind_up": true }));
     with(&document, "/modification", modification)
 }
 
-/// The same with gaps given as clearance.
+/// Returns the same with gaps given as clearances.
 fn cleared(clearance: Value) -> Value {
     with(&modified(json!({})), "/parts", clearance)
 }
@@ -39,7 +39,7 @@ fn relief() -> Value {
 }
 
 #[tokio::test]
-async fn a_surface_set_back_along_its_normals_is_a_clearance_at_its_contact() {
+async fn offset_along_normals_equals_clearance() {
     let pairs = [
         (json!({ "ring_equidistant_um": 10.0 }), json!({ "ring": { "clearance_um": 10.0 } })),
         (json!({ "wave_generator_equidistant_um": 10.0 }), json!({ "wave_generator": { "clearance_um": 10.0 } })),
@@ -57,8 +57,8 @@ async fn a_surface_set_back_along_its_normals_is_a_clearance_at_its_contact() {
 }
 
 #[tokio::test]
-async fn a_turned_ring_or_carrier_is_lost_motion_alone() {
-    // kτ and (Z_G/U)τ for every tooth: docs/theory.md section 4.8.
+async fn turned_ring_or_carrier_is_lost_motion() {
+    // kτ and (Z_G/U)τ for every tooth: docs/explanation/theory.md section 4.8.
     let conjugate = swept(&modified(json!({}))).await;
     for (field, ratio) in [("ring_rotation_arcsec", 13.0), ("carrier_rotation_arcsec", 14.0)] {
         let turned = swept(&modified(json!({ field: 36.0 }))).await;
@@ -71,7 +71,7 @@ async fn a_turned_ring_or_carrier_is_lost_motion_alone() {
 }
 
 #[tokio::test]
-async fn each_number_of_the_modification_moves_an_answer() {
+async fn each_modification_changes_an_answer() {
     let mut all = json!({
         "ring_equidistant_um": 10.0, "ring_path_shift_um": 3.0, "ring_profile_shift_um": 3.0, "ring_rotation_arcsec": 20.0,
         "wave_generator_equidistant_um": 1.0, "slot_wall_um": 1.0, "carrier_rotation_arcsec": 5.0, "tooth_radius_um": 0.5
@@ -93,8 +93,8 @@ async fn each_number_of_the_modification_moves_an_answer() {
 }
 
 #[tokio::test]
-async fn a_path_and_a_profile_moved_outward_take_load_from_where_the_flank_is_flat() {
-    // Δ cos β and Δ cos(β - δ), with δ < β: the path's shift leaves the steep middle the smaller gap, so that it carries more there.
+async fn outward_offsets_unload_flat_part_of_flank() {
+    // Gaps are Δ cos β and Δ cos(β - δ), with δ < β. The path's shift leaves a smaller gap in the steep middle.
     let peak = async |modification: Value| {
         swept(&modified(modification)).await["peaks"]["ring"]["force_n"]["value"].as_f64().unwrap()
     };
@@ -107,7 +107,7 @@ async fn a_path_and_a_profile_moved_outward_take_load_from_where_the_flank_is_fl
 }
 
 #[tokio::test]
-async fn teeth_on_a_relieved_tip_carry_less() {
+async fn teeth_on_relieved_tip_carry_less() {
     let last = |answer: &Value| {
         let states = &answer["states"];
         let pairs = numbers(&states["position_deg"]).into_iter().zip(numbers(&states["force_ring_n"]));
@@ -118,7 +118,7 @@ async fn teeth_on_a_relieved_tip_carry_less() {
 }
 
 #[tokio::test]
-async fn a_part_too_full_is_an_interference_unless_a_clearance_covers_it() {
+async fn interference_is_refused_unless_clearance_covers_it() {
     let full = modified(json!({ "ring_equidistant_um": -4.0 }));
     let problem = Service::new().post("/v1/sweep", &full).await.refused(422, "interference");
     let detail = problem["detail"].as_str().unwrap();
@@ -128,12 +128,12 @@ async fn a_part_too_full_is_an_interference_unless_a_clearance_covers_it() {
     let expected = swept(&cleared(json!({ "ring": { "clearance_um": 1.0 } }))).await;
     let forces = |answer: &Value| numbers(&answer["states"]["force_ring_n"]);
     assert_near(&forces(&found), &forces(&expected), 1e-9);
-    // Geometry reads none of it.
+    // Geometry does not read modifications.
     Service::new().post("/v1/geometry", &full).await.found();
 }
 
 #[tokio::test]
-async fn projection_takes_no_modification_and_says_so_at_its_first_number() {
+async fn projection_rejects_modification_at_its_first_number() {
     let document = with(&modified(json!({ "slot_wall_um": 1.0 })), "/model", json!({ "compatibility": "projection" }));
     let refused = Service::new().post("/v1/sweep", &document).await;
     let problem = refused.refused(422, "impossible_design");
@@ -141,13 +141,13 @@ async fn projection_takes_no_modification_and_says_so_at_its_first_number() {
     assert_eq!(errors.len(), 1, "{problem}");
     assert_eq!(errors[0]["pointer"], "/modification/slot_wall_um");
     assert_eq!(errors[0]["code"], "conflicting_fields");
-    // Where it says nothing, it is none.
+    // A modification of zeros is none.
     let nothing = with(&document, "/modification", json!({ "slot_wall_um": 0.0 }));
     Service::new().post("/v1/sweep", &nothing).await.found();
 }
 
 #[tokio::test]
-async fn a_tip_relief_beyond_the_flank_is_told_beside_other_faults_and_only_once() {
+async fn tip_relief_beyond_flank_is_reported_once() {
     let at = |start_deg: f64| {
         let relief = json!({ "amount_um": 6.0, "start_deg": start_deg, "power": 2.0 });
         with(&modified(json!({ "ring_tip_relief": relief })), "/load", json!({ "input_torque_nm": 0.0 }))
@@ -162,9 +162,9 @@ async fn a_tip_relief_beyond_the_flank_is_told_beside_other_faults_and_only_once
 }
 
 #[tokio::test]
-async fn a_tip_relief_may_start_anywhere_before_the_valley_of_a_single_lobe() {
+async fn single_lobe_tip_relief_may_start_anywhere() {
     let relief = json!({ "amount_um": 3.0, "start_deg": 120.0, "power": 1.0 });
-    // So few teeth that the ring is not undercut, and the flank reaches the valley.
+    // With few teeth the ring is not undercut, and the flank reaches the valley.
     let few = with(&with(&eccentric(), "/drive/teeth/count", json!(12)), "/drive/ring/teeth", json!(11));
     let document = with(&few, "/modification", json!({ "ring_tip_relief": relief }));
     let document = with(&document, "/model", json!({ "compatibility": "virtual_work" }));

@@ -1,4 +1,4 @@
-//! The API document: it is the one that is committed, it holds together, and the service does what it says.
+//! The API document: it is committed, consistent, and describes the service.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -12,7 +12,7 @@ use crate::asking::{Answer, ENDPOINTS, LIMITS, Limits, Question, Service};
 use crate::codes::{field_codes, finding_codes, problem_codes, words};
 use crate::designs::{self, bored, eccentric, every_number, fixed, shortest, spelled_out, undercut, with, without};
 
-/// The document as it is committed.
+/// The committed document.
 pub(crate) const COMMITTED: &str = include_str!("../../openapi/openapi.json");
 
 pub(crate) fn document() -> &'static Value {
@@ -21,13 +21,13 @@ pub(crate) fn document() -> &'static Value {
     &DOCUMENT
 }
 
-/// The path as the document has it.
+/// Returns the path's template in the document.
 fn described(path: &str) -> &str {
     if path.starts_with("/v1/drawings/") { "/v1/drawings/{part}" } else { path }
 }
 
 #[test]
-fn the_committed_document_is_the_one_that_the_code_describes() {
+fn committed_document_matches_code() {
     assert!(
         COMMITTED == toothwave::http::router::openapi_json(),
         "openapi/openapi.json is not what the code describes; write it anew with `cargo run -p toothwave -- openapi > openapi/openapi.json` and look at the difference"
@@ -35,7 +35,7 @@ fn the_committed_document_is_the_one_that_the_code_describes() {
 }
 
 #[test]
-fn every_reference_leads_somewhere() {
+fn every_reference_resolves() {
     let document = document();
     let mut references = 0;
     let mut pending = vec![document];
@@ -56,7 +56,7 @@ fn every_reference_leads_somewhere() {
     assert!(references > 20, "{references} references");
 }
 
-/// Every object of a document.
+/// Returns every object of a document.
 fn objects(document: &Value) -> Vec<&serde_json::Map<String, Value>> {
     let (mut found, mut pending) = (Vec::new(), vec![document]);
     while let Some(value) = pending.pop() {
@@ -73,7 +73,7 @@ fn objects(document: &Value) -> Vec<&serde_json::Map<String, Value>> {
 }
 
 #[test]
-fn there_is_one_problem_and_every_refusal_refers_to_it() {
+fn every_refusal_refers_to_one_problem() {
     let problems: Vec<_> =
         objects(document()).into_iter().filter_map(|object| object.get("application/problem+json")).collect();
     assert!(problems.len() > 50, "{}", problems.len());
@@ -83,12 +83,12 @@ fn there_is_one_problem_and_every_refusal_refers_to_it() {
 }
 
 #[test]
-fn the_document_says_where_its_service_stands() {
+fn server_url_is_relative() {
     assert_eq!(document()["servers"][0]["url"], ".");
 }
 
 #[test]
-fn every_variant_of_a_choice_has_a_name_and_the_word_that_leads_to_it() {
+fn every_variant_has_name_and_discriminator_word() {
     let schemas = document()["components"]["schemas"].as_object().unwrap();
     for (name, words) in [
         ("Stiffness", vec!["linear", "fixed", "palmgren", "johnson", "hertz"]),
@@ -140,7 +140,7 @@ fn no_default_is_null_where_null_is_refused() {
 }
 
 #[test]
-fn a_default_word_stands_with_its_words_and_beside_no_reference() {
+fn default_words_are_never_beside_references() {
     assert_eq!(document()["components"]["schemas"]["ExtentDocument"]["default"], "tooth");
     for object in objects(document()) {
         assert!(!(object.contains_key("$ref") && object.get("default").is_some_and(Value::is_string)), "{object:?}");
@@ -148,8 +148,8 @@ fn a_default_word_stands_with_its_words_and_beside_no_reference() {
 }
 
 #[test]
-fn no_text_ends_a_comment_of_the_languages_that_clients_are_generated_in() {
-    // Of k = E*/2 a generator for C++ makes a comment that ends within the formula.
+fn no_text_contains_comment_markers() {
+    // A generator for C++ puts `k = E*/2` into a comment and so ends it.
     for object in objects(document()) {
         for text in object.values().filter_map(Value::as_str) {
             assert!(!text.contains("*/") && !text.contains("/*"), "{text}");
@@ -158,7 +158,7 @@ fn no_text_ends_a_comment_of_the_languages_that_clients_are_generated_in() {
 }
 
 #[test]
-fn the_rendering_in_3_0_has_no_word_that_only_3_1_knows() {
+fn version_3_0_has_no_3_1_keywords() {
     let document: Value = serde_json::from_str(toothwave::http::router::openapi_3_0_json()).unwrap();
     assert_eq!(document["openapi"], "3.0.3");
     assert_eq!(document["info"]["license"].get("identifier"), None);
@@ -182,7 +182,7 @@ fn the_rendering_in_3_0_has_no_word_that_only_3_1_knows() {
 }
 
 #[tokio::test]
-async fn the_rendering_in_3_0_is_served_beside() {
+async fn version_3_0_is_served() {
     let answer = Service::new().ask(&Question::of("GET", "/openapi-3.0.json")).await;
     assert_eq!((answer.status, answer.text()), (200, toothwave::http::router::openapi_3_0_json()));
 }
@@ -196,14 +196,14 @@ fn every_schema_is_used() {
 }
 
 #[test]
-fn every_path_and_every_status_that_it_can_have_is_described() {
+fn every_path_and_status_is_described() {
     let solving = ["200", "304", "400", "406", "408", "413", "415", "422", "500", "503"];
     let mut expected: Vec<(&str, &str, &[&str])> =
         ENDPOINTS.iter().map(|&path| (described(path), "post", &solving[..])).collect();
     expected.extend([
         ("/v1/design", "post", &solving[..]),
         ("/v1/batch", "post", &["200", "400", "415", "503"]),
-        // Measured for each answer, so there is nothing that a client could have already.
+        // Each answer is measured anew, so 304 does not exist.
         ("/v1/accuracy", "post", &["200", "400", "406", "408", "413", "415", "422", "500", "503"]),
         ("/v1/studies", "post", &["200", "202", "400", "406", "408", "413", "415", "422", "500", "501", "503"]),
         ("/v1/studies/{id}", "get", &["200", "404", "501"]),
@@ -239,7 +239,7 @@ fn every_path_and_every_status_that_it_can_have_is_described() {
 }
 
 #[test]
-fn every_problem_is_described_as_problem_json_and_every_503_of_a_solve_says_when_to_try_again() {
+fn problems_are_problem_json_with_retry_after() {
     let document = document();
     for path in ENDPOINTS {
         let responses = document["paths"][described(path)]["post"]["responses"].as_object().unwrap();
@@ -263,7 +263,7 @@ fn every_problem_is_described_as_problem_json_and_every_503_of_a_solve_says_when
     }
 }
 
-/// Every parameter that has a range.
+/// Lists every parameter that has a range.
 fn parameters() -> Vec<Parameter> {
     let parts = [Part::WaveGenerator, Part::Teeth, Part::Ring, Part::Carrier];
     let contacts = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
@@ -346,7 +346,7 @@ fn parameters() -> Vec<Parameter> {
     parameters
 }
 
-/// The schemas of a schema's fields by name, references and alternatives followed.
+/// Returns the schemas of a schema's fields by name. Follows references and alternatives.
 fn fields_of<'a>(document: &'a Value, schema: &'a Value) -> Vec<(&'a str, &'a Value)> {
     let mut fields = Vec::new();
     if let Some(reference) = schema["$ref"].as_str() {
@@ -357,25 +357,25 @@ fn fields_of<'a>(document: &'a Value, schema: &'a Value) -> Vec<(&'a str, &'a Va
             fields.extend(fields_of(document, alternative));
         }
     }
-    // The first entry of a list stands for all.
+    // The first entry represents a list.
     fields.extend(schema.get("items").map(|schema| ("0", schema)));
     fields.extend(schema["properties"].as_object().into_iter().flatten().map(|(name, schema)| (name.as_str(), schema)));
     fields
 }
 
-/// What a schema offers to choose from, references followed.
+/// Returns the alternatives of a schema. Follows references.
 fn alternatives<'a>(document: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
     let schema = schema["$ref"].as_str().map_or(schema, |reference| document.pointer(&reference[1..]).unwrap());
     schema["oneOf"].as_array().into_iter().flatten().collect()
 }
 
-/// The schemas of all fields below a schema, by pointer.
+/// Returns the schemas of all fields below a schema, by pointer.
 fn below<'a>(document: &'a Value, schema: &'a Value, pointer: &str) -> Vec<(String, &'a Value)> {
     let mut all = Vec::new();
     for (name, schema) in fields_of(document, schema) {
         let pointer = format!("{pointer}/{name}");
         all.extend(below(document, schema, &pointer));
-        // What is a list is looked at by its first item, what may be a number or an object by either.
+        // A list is followed at its first item, and a number or object at both alternatives.
         if let Some(items) = schema.get("items") {
             all.extend(below(document, items, &format!("{pointer}/0")));
         }
@@ -392,7 +392,7 @@ fn is_numeric(schema: &Value) -> bool {
 }
 
 #[test]
-fn every_number_of_the_design_document_has_the_range_that_is_checked() {
+fn every_number_has_the_checked_range() {
     let document = document();
     let all = below(document, &document["components"]["schemas"]["Design"], "");
     let parameters = parameters();
@@ -416,7 +416,7 @@ fn every_number_of_the_design_document_has_the_range_that_is_checked() {
 }
 
 #[test]
-fn every_default_of_the_schema_is_the_one_that_is_taken() {
+fn every_schema_default_is_the_applied_one() {
     let document = document();
     let all = below(document, &document["components"]["schemas"]["Design"], "");
     let mut defaults = 0;
@@ -434,7 +434,7 @@ fn every_default_of_the_schema_is_the_one_that_is_taken() {
     assert!(defaults >= 8, "{defaults} defaults");
 }
 
-/// Equal as JSON, where 210 is 210.0.
+/// True if both are equal as JSON, with 210 equal to 210.0.
 fn equal(one: &Value, other: &Value) -> bool {
     match (one, other) {
         (Value::Number(one), Value::Number(other)) => one.as_f64() == other.as_f64(),
@@ -447,7 +447,7 @@ fn equal(one: &Value, other: &Value) -> bool {
 }
 
 #[test]
-fn every_code_is_in_the_document() {
+fn document_contains_every_code() {
     let document = document();
     for (schema, words) in [
         ("ProblemCode", words(&problem_codes())),
@@ -462,7 +462,7 @@ fn every_code_is_in_the_document() {
 }
 
 fn documentation(name: &str) -> String {
-    let path = format!("{}/../../docs/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/../../docs/reference/{name}", env!("CARGO_MANIFEST_DIR"));
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
@@ -470,19 +470,19 @@ fn documentation(name: &str) -> String {
 fn docs_findings_explains_every_finding() {
     let text = documentation("findings.md");
     for word in words(&finding_codes()) {
-        assert!(text.contains(&format!("`{word}`")), "docs/findings.md does not name `{word}`");
+        assert!(text.contains(&format!("`{word}`")), "docs/reference/findings.md does not name `{word}`");
     }
 }
 
 #[test]
-fn docs_problems_explains_every_problem_and_every_fault_of_a_field() {
+fn docs_problems_explains_every_code() {
     let text = documentation("problems.md");
     for word in words(&problem_codes()).into_iter().chain(words(&field_codes())) {
-        assert!(text.contains(&format!("`{word}`")), "docs/problems.md does not name `{word}`");
+        assert!(text.contains(&format!("`{word}`")), "docs/reference/problems.md does not name `{word}`");
     }
 }
 
-/// A schema of the document, with all that it refers to.
+/// Compiles a schema of the document with all its references.
 fn validator(schema: &Value) -> jsonschema::Validator {
     let schema = json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -498,7 +498,7 @@ fn assert_valid(schema: &Value, instance: &Value, what: &str) {
     assert!(errors.is_empty(), "{what}: {errors:#?}");
 }
 
-/// That the answer is one which the document describes for the path.
+/// Asserts that the document describes this answer for the path.
 fn assert_described(method: &str, path: &str, answer: &Answer) {
     let document = document();
     let what = format!("{method} {path}: {}", answer.status);
@@ -516,13 +516,13 @@ fn assert_described(method: &str, path: &str, answer: &Answer) {
     assert_all_described(document, schema, &instance, &what);
 }
 
-/// That every field of the instance stands in its schema: schemas of answers admit more, so that answers may grow.
+/// Asserts that the schema has every field of the instance. Schemas of answers allow more, so that answers can grow.
 fn assert_all_described(document: &Value, schema: &Value, instance: &Value, what: &str) {
     if let Some(items) = schema.get("items").or_else(|| {
         let reference = schema["$ref"].as_str()?;
         document.pointer(&reference[1..])?.get("items")
     }) {
-        // All items are alike: a few thousand numbers more tell nothing.
+        // All items are alike, so a few suffice.
         for item in instance.as_array().into_iter().flatten().take(3) {
             assert_all_described(document, items, item, what);
         }
@@ -538,7 +538,7 @@ fn assert_all_described(document: &Value, schema: &Value, instance: &Value, what
 }
 
 #[tokio::test]
-async fn every_success_is_as_described() {
+async fn every_success_matches_its_schema() {
     let service = Service::new();
     let bore_without_effect = serde_json::from_str(designs::CONTRACT).unwrap();
     let overloaded = with(&spelled_out(), "/load/input_torque_nm", json!(2000.0));
@@ -572,7 +572,7 @@ async fn every_success_is_as_described() {
 }
 
 #[tokio::test]
-async fn every_304_is_as_described() {
+async fn every_304_matches_its_description() {
     let service = Service::new();
     for path in ENDPOINTS {
         let question = Question::post(path, shortest().to_string());
@@ -584,7 +584,7 @@ async fn every_304_is_as_described() {
 }
 
 #[tokio::test]
-async fn every_problem_is_as_described() {
+async fn every_problem_matches_its_schema() {
     let limits = Limits { max_states: 300, ..LIMITS };
     let service = Service::within(limits);
     let mut statuses = BTreeSet::new();
@@ -622,7 +622,7 @@ fn design_schema() -> Value {
 }
 
 #[tokio::test]
-async fn what_the_service_takes_the_schema_takes_too() {
+async fn schema_accepts_what_the_service_accepts() {
     let service = Service::new();
     let documents = [
         spelled_out(),
@@ -645,7 +645,7 @@ async fn what_the_service_takes_the_schema_takes_too() {
     }
 }
 
-/// Of each kind, shape and law one, with its word and, where it is the default, without.
+/// Returns one document for each kind, shape and law. Defaults appear with and without their word.
 fn kinds() -> Vec<Value> {
     let wave_generators = [
         json!({ "kind": "ellipse", "semi_major_mm": 49.0, "semi_minor_mm": 47.0 }),
@@ -685,7 +685,7 @@ fn kinds() -> Vec<Value> {
 }
 
 #[tokio::test]
-async fn every_kind_shape_and_law_is_answered_and_as_described() {
+async fn every_kind_is_answered_as_described() {
     let service = Service::new();
     for document in kinds() {
         assert_valid(&design_schema(), &document, &document.to_string());
@@ -697,9 +697,9 @@ async fn every_kind_shape_and_law_is_answered_and_as_described() {
     }
 }
 
-/// Generators of clients tell kinds apart by the discriminator: each schema that it leads to requires the word that leads there.
+/// Generated clients tell kinds apart by this word.
 #[test]
-fn every_discriminator_leads_to_schemas_that_require_its_word() {
+fn every_discriminator_maps_to_schemas_requiring_its_word() {
     let document = document();
     let mut unions = 0;
     for (name, schema) in document["components"]["schemas"].as_object().unwrap() {
@@ -718,7 +718,7 @@ fn every_discriminator_leads_to_schemas_that_require_its_word() {
 }
 
 #[tokio::test]
-async fn what_the_service_refuses_by_form_or_range_the_schema_refuses_too() {
+async fn schema_refuses_invalid_form_and_range() {
     let service = Service::new();
     let schema = validator(&design_schema());
     let mut refused = vec![json!(null), json!([]), json!({}), json!("drive")];
@@ -734,7 +734,7 @@ async fn what_the_service_refuses_by_form_or_range_the_schema_refuses_too() {
         }
     }
     for document in refused {
-        // A value out of its range is refused by those endpoints that read it: no single one reads all.
+        // No endpoint reads all values, so those that read this one must refuse it.
         let statuses =
             [service.post("/v1/sweep", &document).await.status, service.post("/v1/geometry", &document).await.status];
         assert!(statuses.contains(&422), "{document}");
@@ -743,7 +743,7 @@ async fn what_the_service_refuses_by_form_or_range_the_schema_refuses_too() {
 }
 
 #[test]
-fn the_example_in_the_document_is_a_design() {
+fn example_in_the_document_is_a_design() {
     let document = document();
     let example = &document["components"]["schemas"]["Design"]["example"];
     assert!(example.is_object());

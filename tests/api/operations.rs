@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::asking::{ENDLESS, ENDPOINTS, LIMITS, Limits, Question, Service, endless};
 use crate::designs::spelled_out;
 
-/// The names of all series in Prometheus' text, those of a histogram as its name.
+/// Returns the names of all series in Prometheus text, with one name for each histogram.
 fn series(text: &str) -> BTreeSet<String> {
     let names = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty()).map(|line| {
         let name = line.split(['{', ' ']).next().unwrap();
@@ -17,8 +17,8 @@ fn series(text: &str) -> BTreeSet<String> {
 }
 
 #[tokio::test]
-async fn every_series_is_documented_and_every_documented_one_is_there() {
-    // What each of them counts, once.
+async fn documented_series_are_the_exported_ones() {
+    // Causes one count in each series.
     let service = Service::within(Limits { deadline_ms: 200, ..ENDLESS });
     service.post("/v1/sweep", &spelled_out()).await.found();
     let line = Question::post_as("application/x-ndjson", "/v1/batch", spelled_out().to_string());
@@ -28,7 +28,7 @@ async fn every_series_is_documented_and_every_documented_one_is_there() {
     for series in series(&text) {
         assert!(text.contains(&format!("# HELP {series} ")), "{series} says nothing of itself");
     }
-    let documented: BTreeSet<String> = include_str!("../../docs/operations.md")
+    let documented: BTreeSet<String> = include_str!("../../docs/reference/service.md")
         .split('`')
         .filter(|word| word.starts_with("toothwave_") || word.starts_with("process_"))
         .map(|word| word.split('{').next().unwrap().to_owned())
@@ -37,7 +37,7 @@ async fn every_series_is_documented_and_every_documented_one_is_there() {
 }
 
 #[tokio::test]
-async fn metrics_are_prometheus_text_and_tell_of_requests_cache_and_solves() {
+async fn metrics_count_requests_cache_and_solves() {
     let service = Service::new();
     service.post("/v1/sweep", &spelled_out()).await.found();
     service.post("/v1/sweep", &spelled_out()).await.found();
@@ -71,14 +71,14 @@ async fn metrics_are_prometheus_text_and_tell_of_requests_cache_and_solves() {
 }
 
 #[tokio::test]
-async fn a_path_that_nothing_stands_at_makes_no_metric_of_its_own() {
+async fn unknown_path_creates_no_metric() {
     let service = Service::new();
     service.get("/a-path-that-a-scanner-made-up").await.problem();
     service.get("/v1/examples/a-name-that-a-scanner-made-up").await.problem();
     assert!(!service.get("/metrics").await.text().contains("scanner"));
 }
 
-/// Everything the page at `/docs/` loads, and the page itself.
+/// Requests the page at `/docs/` and everything that it loads.
 async fn pages(service: &Service) -> Vec<(String, String)> {
     let page = service.get("/docs/").await;
     assert_eq!((page.status, page.header("content-type").split(';').next()), (200, Some("text/html")));
@@ -98,7 +98,7 @@ async fn pages(service: &Service) -> Vec<(String, String)> {
 }
 
 #[tokio::test]
-async fn the_documentation_page_loads_from_this_service_alone() {
+async fn documentation_page_loads_from_this_service_only() {
     let service = Service::new();
     let pages = pages(&service).await;
     assert!(pages.len() > 3, "page, style, and scripts");
@@ -117,21 +117,21 @@ async fn the_documentation_page_loads_from_this_service_alone() {
 }
 
 #[tokio::test]
-async fn the_documentation_is_found_without_the_slash_too() {
+async fn documentation_path_works_without_slash() {
     let answer = Service::new().get("/docs").await;
     assert!((300..400).contains(&answer.status), "{}", answer.status);
     assert_eq!(answer.header("location"), "docs/");
 }
 
 #[tokio::test]
-async fn the_api_document_is_served_as_it_is_committed() {
+async fn served_api_document_is_the_committed_one() {
     let answer = Service::new().get("/openapi.json").await;
     assert_eq!(answer.header("content-type"), "application/json");
     assert_eq!(answer.text(), crate::openapi::COMMITTED);
 }
 
 #[tokio::test]
-async fn no_answer_of_any_kind_holds_a_null() {
+async fn no_answer_contains_null() {
     let service = Service::within(LIMITS);
     let mut answers = Vec::new();
     for path in ["/v1/limits", "/v1/examples"] {

@@ -1,11 +1,11 @@
-//! The contract's examples, and the paper's cases as separate calculations found them.
+//! The documented examples, and the paper's cases against separate calculations.
 
 use serde_json::{Value, json};
 
 use crate::asking::{Answer, ENDPOINTS, Question, Service};
 use crate::designs::{self, with};
 
-/// The columns of `states` by name, in the contract's order.
+/// The columns of `states` by name, in documented order.
 const COLUMNS: [&str; 12] = [
     "input_angle_deg",
     "tooth",
@@ -21,7 +21,7 @@ const COLUMNS: [&str; 12] = [
     "stress_carrier_mpa",
 ];
 
-/// All that the contract's example says of an answer: names, types, values to 1e-12. Where it elides with `[]`, numbers are due.
+/// Asserts that the answer has the documented names, types and values (to 1e-12). A documented `[]` stands for numbers.
 fn assert_says(found: &Value, expected: &Value, at: &str) {
     match expected {
         Value::Object(fields) => {
@@ -49,7 +49,7 @@ async fn answered(path: &str, document: &Value) -> Value {
     Service::new().post(path, document).await.found()
 }
 
-/// The same document as the contract prints it and as the service offers it under the paper's name.
+/// Returns case 5.1 as documented and as the service's example.
 async fn case_5_1() -> [Value; 2] {
     let contract = serde_json::from_str(designs::CONTRACT).unwrap();
     [contract, example("paper-5.1").await]
@@ -67,7 +67,7 @@ fn numbers(answer: &Value, name: &str) -> Vec<f64> {
     column(answer, name).into_iter().map(|value| value.as_f64().unwrap()).collect()
 }
 
-/// The states of each input angle, by index.
+/// Returns the index range of the states at each input angle.
 fn by_input_angle(answer: &Value) -> Vec<std::ops::Range<usize>> {
     let angles = numbers(answer, "input_angle_deg");
     let mut groups = Vec::new();
@@ -87,7 +87,7 @@ fn assert_near(found: &Value, expected: f64, tolerance: f64) {
 }
 
 #[tokio::test]
-async fn case_5_1_has_the_geometry_that_the_contract_prints() {
+async fn case_5_1_geometry_matches_documented_values() {
     let expected = json!({
         "solver_version": "0.2.0",
         "transmission_ratio": 14.0, "transmission_ratio_carrier_fixed": -13.0,
@@ -104,7 +104,7 @@ async fn case_5_1_has_the_geometry_that_the_contract_prints() {
 }
 
 #[tokio::test]
-async fn case_5_1_has_the_coincidence_degree_that_the_contract_prints() {
+async fn case_5_1_coincidence_degree_matches_documented_value() {
     let expected = json!({
         "solver_version": "0.2.0",
         "coincidence_degree": 14.0,
@@ -121,7 +121,7 @@ async fn case_5_1_has_the_coincidence_degree_that_the_contract_prints() {
 }
 
 #[tokio::test]
-async fn case_5_1_has_the_sweep_that_the_contract_prints() {
+async fn case_5_1_sweep_matches_documented_values() {
     let peak = json!({ "value": [], "input_angle_deg": [], "position_deg": [] });
     let peak_fields: Vec<_> = peak.as_object().unwrap().keys().cloned().collect();
     let expected = json!({
@@ -153,7 +153,7 @@ async fn case_5_1_has_the_sweep_that_the_contract_prints() {
 }
 
 #[tokio::test]
-async fn the_contracts_own_document_has_no_findings_as_the_contract_prints() {
+async fn documented_document_has_no_findings() {
     let document = serde_json::from_str(designs::CONTRACT).unwrap();
     for path in ENDPOINTS {
         assert_eq!(answered(path, &document).await["findings"], json!([]), "{path}");
@@ -167,7 +167,7 @@ async fn case_5_1_has_no_findings() {
     }
 }
 
-/// The six peaks, to the three decimals that separate calculations give.
+/// Asserts the six peaks to three decimals, known from separate calculations.
 async fn assert_peaks(compatibility: &str, expected: [f64; 6]) {
     let document = with(&designs::spelled_out(), "/model/compatibility", json!(compatibility));
     let peaks = &answered("/v1/sweep", &document).await["peaks"];
@@ -181,17 +181,17 @@ async fn assert_peaks(compatibility: &str, expected: [f64; 6]) {
 }
 
 #[tokio::test]
-async fn case_5_1_has_the_known_peaks_by_projection() {
+async fn case_5_1_has_known_projection_peaks() {
     assert_peaks("projection", [1429.443, 1549.279, 645.337, 872.606, 980.437, 562.162]).await;
 }
 
 #[tokio::test]
-async fn case_5_1_has_the_known_peaks_by_virtual_work() {
+async fn case_5_1_has_known_virtual_work_peaks() {
     assert_peaks("virtual_work", [1370.248, 1485.085, 618.576, 854.363, 1014.466, 550.383]).await;
 }
 
 #[tokio::test]
-async fn case_5_1_has_its_largest_ring_stress_near_the_tip_and_its_largest_force_halfway() {
+async fn case_5_1_has_known_places_of_peaks() {
     for (compatibility, ring_stress_deg, force_deg) in [("projection", 70.2, 43.7), ("virtual_work", 72.8, 43.5)] {
         let document = with(&designs::spelled_out(), "/model/compatibility", json!(compatibility));
         let peaks = &answered("/v1/sweep", &document).await["peaks"];
@@ -202,7 +202,7 @@ async fn case_5_1_has_its_largest_ring_stress_near_the_tip_and_its_largest_force
 }
 
 #[tokio::test]
-async fn case_5_2_is_undercut_with_the_known_coincidence_degree() {
+async fn case_5_2_has_known_undercut() {
     let found = answered("/v1/coincidence-degree", &example("paper-5.2").await).await;
     assert_eq!(found["undercut"]["occurs"], true);
     assert_near(&found["coincidence_degree"], 9.690_577_523_835, 1e-12);
@@ -218,7 +218,7 @@ async fn case_5_2_is_undercut_with_the_known_coincidence_degree() {
 }
 
 #[tokio::test]
-async fn case_5_2_bored_has_the_papers_coincidence_degree_and_three_or_four_teeth() {
+async fn bored_case_5_2_matches_the_paper() {
     let document = example("paper-5.2-bored").await;
     assert_eq!(document["drive"]["ring"]["tip_radius_mm"], 52.8227);
     let found = answered("/v1/coincidence-degree", &document).await;
@@ -230,7 +230,7 @@ async fn case_5_2_bored_has_the_papers_coincidence_degree_and_three_or_four_teet
 }
 
 #[tokio::test]
-async fn a_radius_that_undercuts_is_left_out_where_there_is_none() {
+async fn critical_radius_is_omitted_without_undercut() {
     let rounder = with(&designs::shortest(), "/drive/wave_generator/semi_minor_mm", json!(57.9));
     for path in ["/v1/geometry", "/v1/coincidence-degree"] {
         assert_eq!(answered(path, &rounder).await["undercut"], json!({ "occurs": false }), "{path}");
@@ -238,7 +238,7 @@ async fn a_radius_that_undercuts_is_left_out_where_there_is_none() {
 }
 
 #[tokio::test]
-async fn states_are_columns_of_equal_length_by_input_angle_then_tooth() {
+async fn states_are_equal_columns_in_order() {
     for document in [designs::spelled_out(), designs::undercut(), designs::bored()] {
         let found = answered("/v1/sweep", &document).await;
         let fields = found["states"].as_object().unwrap();
@@ -256,7 +256,7 @@ async fn states_are_columns_of_equal_length_by_input_angle_then_tooth() {
 }
 
 #[tokio::test]
-async fn a_sweep_of_n_samples_has_n_plus_1_input_angles_from_0_to_the_period() {
+async fn sweep_has_one_angle_more_than_samples() {
     for samples in [1_u32, 2, 3, 50, 333] {
         let document = with(&designs::undercut(), "/sweep", json!({ "samples": samples }));
         let found = answered("/v1/sweep", &document).await;
@@ -273,7 +273,7 @@ async fn a_sweep_of_n_samples_has_n_plus_1_input_angles_from_0_to_the_period() {
 }
 
 #[tokio::test]
-async fn states_hold_every_tooth_between_the_root_and_the_end_of_the_flank_and_no_other() {
+async fn states_hold_teeth_between_root_and_flank_end() {
     for document in [designs::spelled_out(), designs::undercut(), designs::bored()] {
         let found = answered("/v1/sweep", &document).await;
         let end_deg = answered("/v1/geometry", &document).await["engagement"]["start_deg"].as_f64().unwrap();
@@ -299,7 +299,7 @@ async fn states_hold_every_tooth_between_the_root_and_the_end_of_the_flank_and_n
 }
 
 #[tokio::test]
-async fn a_tooth_exactly_at_the_tip_meshes_and_one_exactly_at_the_root_does_not() {
+async fn tooth_at_tip_meshes_and_at_root_not() {
     let found = answered("/v1/sweep", &designs::spelled_out()).await;
     let positions = numbers(&found, "position_deg");
     for group in by_input_angle(&found) {
@@ -318,7 +318,7 @@ async fn a_tooth_exactly_at_the_tip_meshes_and_one_exactly_at_the_root_does_not(
 }
 
 #[tokio::test]
-async fn a_period_ends_as_it_began_with_the_teeth_renumbered() {
+async fn period_ends_as_it_began_with_teeth_renumbered() {
     for document in [designs::spelled_out(), designs::undercut(), designs::bored()] {
         let found = answered("/v1/sweep", &document).await;
         let (first, last) = (by_input_angle(&found).remove(0), by_input_angle(&found).pop().unwrap());
@@ -337,7 +337,7 @@ async fn a_period_ends_as_it_began_with_the_teeth_renumbered() {
 }
 
 #[tokio::test]
-async fn at_every_input_angle_the_slots_together_carry_the_output_torque() {
+async fn slots_carry_output_torque_at_every_angle() {
     for (document, input_nm) in [(designs::spelled_out(), 20.0), (designs::undercut(), 3.0), (designs::bored(), 3.0)] {
         for compatibility in ["projection", "virtual_work"] {
             let document = with(&document, "/model", json!({ "compatibility": compatibility }));
@@ -353,7 +353,7 @@ async fn at_every_input_angle_the_slots_together_carry_the_output_torque() {
 }
 
 #[tokio::test]
-async fn a_torque_at_the_carrier_asks_for_what_the_same_torque_at_the_wave_generator_gives() {
+async fn torque_at_carrier_equals_torque_at_wave_generator() {
     let document = with(&designs::spelled_out(), "/load", json!({ "output_torque_nm": 280.0 }));
     let (by_output, by_input) =
         (answered("/v1/sweep", &document).await, answered("/v1/sweep", &designs::spelled_out()).await);
@@ -365,7 +365,7 @@ async fn a_torque_at_the_carrier_asks_for_what_the_same_torque_at_the_wave_gener
 }
 
 #[tokio::test]
-async fn every_wave_generator_angle_names_the_place_where_cam_and_tooth_touch() {
+async fn wave_generator_angle_is_place_of_contact() {
     for document in [designs::spelled_out(), designs::undercut()] {
         let found = answered("/v1/sweep", &document).await;
         let cam = &document["drive"]["wave_generator"];
@@ -374,7 +374,8 @@ async fn every_wave_generator_angle_names_the_place_where_cam_and_tooth_touch() 
         let (angles, positions) = (numbers(&found, "wave_generator_angle_deg"), numbers(&found, "position_deg"));
         for (i, d) in numbers(&found, "center_radius_mm").into_iter().enumerate() {
             let (sin, cos) = positions[i].to_radians().sin_cos();
-            // From the minor axis, on the ellipse, exactly r away from the tooth's centre, and the nearest place so.
+            // The angle counts from the minor axis. Its point on the ellipse is r from the tooth's centre, the least
+            // distance.
             let distance = |angle_deg: f64| {
                 let (y, x) = angle_deg.to_radians().sin_cos();
                 let radius = a * b / (a * x).hypot(b * y);
@@ -387,7 +388,7 @@ async fn every_wave_generator_angle_names_the_place_where_cam_and_tooth_touch() 
 }
 
 #[tokio::test]
-async fn peaks_are_the_largest_of_their_columns_and_name_the_state() {
+async fn peaks_are_column_maxima_with_their_state() {
     for document in [designs::spelled_out(), designs::undercut(), designs::bored()] {
         let found = answered("/v1/sweep", &document).await;
         let (angles, positions) = (numbers(&found, "input_angle_deg"), numbers(&found, "position_deg"));
@@ -409,7 +410,7 @@ async fn peaks_are_the_largest_of_their_columns_and_name_the_state() {
     }
 }
 
-/// Force at the wave generator when a tooth is first and last seen, over the peak.
+/// Returns the force at the wave generator over the peak, in a tooth's first and last state.
 async fn entering_and_leaving(document: &Value) -> (f64, f64) {
     let found = answered("/v1/sweep", document).await;
     let groups = by_input_angle(&found);
@@ -429,7 +430,7 @@ async fn entering_and_leaving(document: &Value) -> (f64, f64) {
 }
 
 #[tokio::test]
-async fn the_load_of_case_5_2_jumps_where_a_tooth_enters_and_not_where_one_leaves() {
+async fn case_5_2_load_jumps_only_at_entry() {
     for document in [designs::undercut(), designs::bored()] {
         let document = with(&document, "/sweep", json!({ "samples": 1000 }));
         let (entering, leaving) = entering_and_leaving(&document).await;
@@ -439,7 +440,7 @@ async fn the_load_of_case_5_2_jumps_where_a_tooth_enters_and_not_where_one_leave
 }
 
 #[tokio::test]
-async fn the_load_of_case_5_2_drops_on_the_other_teeth_when_one_enters() {
+async fn case_5_2_entering_tooth_unloads_others() {
     let document = with(&designs::undercut(), "/sweep", json!({ "samples": 1000 }));
     let found = answered("/v1/sweep", &document).await;
     let (forces, teeth) = (numbers(&found, "force_wave_generator_n"), numbers(&found, "tooth"));
@@ -465,14 +466,14 @@ async fn the_load_of_case_5_2_drops_on_the_other_teeth_when_one_enters() {
 }
 
 #[tokio::test]
-async fn the_load_of_case_5_1_rises_from_nothing_and_falls_back_to_nothing() {
+async fn case_5_1_load_is_zero_at_ends() {
     let document = with(&designs::spelled_out(), "/sweep", json!({ "samples": 1000 }));
     let (entering, leaving) = entering_and_leaving(&document).await;
     assert!(entering < 2e-3 && leaving < 2e-3, "from {entering} to {leaving} of the peak");
 }
 
 #[tokio::test]
-async fn csv_holds_the_same_states_as_json_under_the_same_names() {
+async fn csv_has_states_and_names_of_json() {
     for document in [designs::spelled_out(), designs::undercut(), designs::bored()] {
         let service = Service::new();
         let json = service.post("/v1/sweep", &document).await.found();

@@ -1,4 +1,4 @@
-//! What docs/plug-ins.md shows.
+//! What docs/how-to/plug-ins.md shows.
 
 use serde_json::{Value, json};
 
@@ -19,7 +19,7 @@ async fn plug_ins_show_edges_as_they_come() {
     for (part, document) in [("tooth", flat_sided), ("wave-generator", coarse)] {
         edges.extend(drawn(part, &document).await["bodies"][0]["outer"]["edges"].as_array().unwrap().clone());
     }
-    let shown: Vec<_> = include_str!("../../docs/plug-ins.md").split("```json\n").skip(1).collect();
+    let shown: Vec<_> = include_str!("../../docs/how-to/plug-ins.md").split("```json\n").skip(1).collect();
     let shown = shown.iter().map(|text| document(text.split("```").next().unwrap()));
     let kinds: Vec<_> = shown.clone().map(|edge| edge["kind"].clone()).collect();
     assert_eq!(kinds, ["line", "arc", "curve"]);

@@ -1,4 +1,4 @@
-//! What bad input and trouble get: RFC 9457 problems, each with the headers that HTTP wants.
+//! Responses to bad input and faults: RFC 9457 problems with the headers that HTTP requires.
 
 use std::io::Write as _;
 use std::net::TcpStream;
@@ -12,7 +12,7 @@ fn sweep() -> Question {
     Question::post("/v1/sweep", shortest().to_string())
 }
 
-/// A problem of each kind that a request alone can provoke, with its status and code.
+/// Provokes each problem that a request alone can cause. Returns it with expected status and code.
 async fn provoked(service: &Service) -> Vec<(Answer, u16, &'static str)> {
     let huge = " ".repeat(LIMITS.max_body_bytes + 1);
     let impossible = with(&shortest(), "/drive/teeth/radius_mm", json!(0.0)).to_string();
@@ -43,7 +43,7 @@ async fn provoked(service: &Service) -> Vec<(Answer, u16, &'static str)> {
 }
 
 #[tokio::test]
-async fn every_problem_is_problem_json_with_type_title_status_detail_and_code() {
+async fn every_problem_is_complete_problem_json() {
     let service = Service::within(Limits { max_states: 10_000, ..LIMITS });
     for (answer, status, code) in provoked(&service).await {
         answer.refused(status, code);
@@ -51,7 +51,7 @@ async fn every_problem_is_problem_json_with_type_title_status_detail_and_code() 
 }
 
 #[tokio::test]
-async fn every_problem_carries_the_headers_that_browsers_ask_for() {
+async fn every_problem_carries_headers_for_browsers() {
     let service = Service::for_origins(&["https://cad.example", "https://other.example"]);
     for (answer, status, _) in provoked(&service).await {
         assert_eq!(answer.header("access-control-allow-origin"), "https://cad.example", "{status}");
@@ -63,7 +63,7 @@ async fn every_problem_carries_the_headers_that_browsers_ask_for() {
 }
 
 #[test]
-fn full_service_answers_browsers_and_says_when_to_retry() {
+fn full_service_tells_browsers_when_to_retry() {
     let limits = Limits { max_concurrent_solves: 1, ..ENDLESS };
     let service = Service::with(limits, &["--cors-origin", "*"]);
     let occupied = service.occupied_by(1);
@@ -76,7 +76,7 @@ fn full_service_answers_browsers_and_says_when_to_retry() {
 }
 
 #[tokio::test]
-async fn answers_name_an_allowed_origin_and_no_other() {
+async fn answers_name_only_allowed_origin() {
     let service = Service::for_origins(&["https://cad.example"]);
     let from = |origin| sweep().with("origin", origin);
     assert_eq!(
@@ -97,7 +97,7 @@ fn preflight() -> Question {
 }
 
 #[tokio::test]
-async fn a_browser_that_asks_first_is_allowed_to_post_json() {
+async fn preflight_request_allows_posting_json() {
     let answer = Service::for_origins(&["https://cad.example"]).ask(&preflight()).await;
     assert_eq!(answer.status, 200);
     assert_eq!(answer.header("access-control-allow-origin"), "https://cad.example");
@@ -137,13 +137,13 @@ async fn every_answer_has_a_request_id() {
 }
 
 #[tokio::test]
-async fn the_answer_to_a_browser_that_asks_first_has_a_request_id_too() {
+async fn preflight_answer_has_request_id() {
     let answer = Service::for_origins(&["https://cad.example"]).ask(&preflight()).await;
     assert_ne!(answer.header("x-request-id"), "");
 }
 
 #[tokio::test]
-async fn a_request_id_that_the_client_chose_comes_back() {
+async fn request_id_of_client_is_returned() {
     let service = Service::new();
     for question in [
         sweep(),
@@ -157,14 +157,14 @@ async fn a_request_id_that_the_client_chose_comes_back() {
 }
 
 #[tokio::test]
-async fn nothing_stands_at_any_other_path() {
+async fn unknown_path_is_not_found() {
     let service = Service::new();
     for path in
         ["/v1", "/v1/", "/v1/sweep/", "/V1/sweep", "/v1/Sweep", "/v2/sweep", "/v1/examples/", "/v1/examples/paper-5.3"]
     {
         for method in ["GET", "POST"] {
             let answer = service.ask(&Question::of(method, path)).await;
-            // A path with a name in it knows GET alone, whatever the name.
+            // A path with a name allows only GET, for any name.
             if (method, path) != ("POST", "/v1/examples/paper-5.3") {
                 answer.refused(404, "not_found");
             }
@@ -173,7 +173,7 @@ async fn nothing_stands_at_any_other_path() {
 }
 
 #[tokio::test]
-async fn nothing_stands_beside_the_pages_of_the_documentation_either() {
+async fn unknown_documentation_path_is_not_found() {
     let service = Service::new();
     for path in ["/docs/nothing.js", "/docs/v1/sweep", "/docs/../main.rs"] {
         service.get(path).await.refused(404, "not_found");
@@ -181,14 +181,14 @@ async fn nothing_stands_beside_the_pages_of_the_documentation_either() {
 }
 
 #[tokio::test]
-async fn a_name_that_is_no_text_is_no_examples_name() {
+async fn example_name_without_valid_text_is_not_found() {
     let answer = Service::new().get("/v1/examples/%FF").await;
     assert!([400, 404].contains(&answer.status));
     answer.problem();
 }
 
 #[tokio::test]
-async fn a_path_that_knows_other_methods_lists_them() {
+async fn wrong_method_lists_allowed_ones() {
     let service = Service::new();
     let posts = ENDPOINTS.map(|path| (path, "POST"));
     let gets = [
@@ -217,7 +217,7 @@ async fn a_path_that_knows_other_methods_lists_them() {
 }
 
 #[tokio::test]
-async fn head_gets_what_get_gets_without_the_body() {
+async fn head_equals_get_without_body() {
     let service = Service::new();
     for path in ["/v1/limits", "/v1/examples/paper-5.1", "/health/live", "/openapi.json", "/docs/"] {
         let (get, head) = (service.get(path).await, service.ask(&Question::of("HEAD", path)).await);
@@ -227,13 +227,13 @@ async fn head_gets_what_get_gets_without_the_body() {
 }
 
 #[tokio::test]
-async fn the_best_format_that_the_client_accepts_is_chosen() {
+async fn accept_header_chooses_best_format() {
     let service = Service::new();
     for (accept, expected) in [
         ("application/json; charset=utf-8", "application/json"),
         ("text/csv; charset=utf-8; header=present", "text/csv"),
         ("text/csv;charset=utf-8;q=0.5, application/json;charset=utf-8;q=0.4", "text/csv"),
-        // What cannot be read is passed over, as empty items are, and a list in quotes.
+        // Unreadable items are skipped, like empty ones and a quoted list.
         ("text/html, image/gif, image/jpeg, *; q=.2, */*; q=.2", "application/json"),
         ("text/csv, ,", "text/csv"),
         ("text/csv, text/x;a=\"b,c\"", "text/csv"),
@@ -259,7 +259,7 @@ async fn the_best_format_that_the_client_accepts_is_chosen() {
 }
 
 #[tokio::test]
-async fn a_client_that_accepts_no_format_of_a_path_is_told_which_there_are() {
+async fn unaccepted_formats_get_list_of_available_ones() {
     let service = Service::new();
     for accept in ["image/png", "text/html", "application/json;q=0", "*/*;q=0", "application/xml, image/vnd.dxf"] {
         let problem = service.ask(&sweep().with("accept", accept)).await.refused(406, "not_acceptable");
@@ -278,9 +278,9 @@ async fn a_client_that_accepts_no_format_of_a_path_is_told_which_there_are() {
     }
 }
 
-/// Thousands of ranges took milliseconds each, in which nobody else was answered.
+/// Thousands of ranges would take milliseconds and delay other requests.
 #[tokio::test]
-async fn of_lists_of_what_is_accepted_no_more_is_read_than_anybody_sends() {
+async fn reads_limited_number_of_accept_ranges() {
     let service = Service::new();
     let list = |length: usize| format!("application/json,{}", "a/b,".repeat(length / 4));
     assert_eq!(service.ask(&sweep().with("accept", &list(4000))).await.status, 200);
@@ -293,7 +293,7 @@ async fn of_lists_of_what_is_accepted_no_more_is_read_than_anybody_sends() {
 }
 
 #[tokio::test]
-async fn a_body_that_is_too_large_is_refused_with_its_length_and_the_limit() {
+async fn refusal_of_large_body_states_length_and_limit() {
     let service = Service::within(Limits { max_body_bytes: 1_000, ..LIMITS });
     let padded = |length: usize| format!("{:length$}", shortest().to_string());
     for path in ENDPOINTS {
@@ -305,7 +305,7 @@ async fn a_body_that_is_too_large_is_refused_with_its_length_and_the_limit() {
     }
 }
 
-/// A request whose body is sent in one chunk, so that nobody announces its length.
+/// Makes a request with a chunked body, so that no header states its length.
 fn unannounced(text: &str, end: &str) -> Vec<u8> {
     let head = "POST /v1/sweep HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-type: application/json";
     format!("{head}\r\ntransfer-encoding: chunked\r\n\r\n{:x}\r\n{text}\r\n{end}", text.len()).into_bytes()
@@ -331,9 +331,9 @@ fn rejects_body_that_breaks_off() {
     sent(&Service::new(), &unannounced("{\"dri", "no length\r\n")).refused(400, "broken_body");
 }
 
-/// Most of it is still to come when the service knows the answer.
+/// The service refuses before most of the body has arrived.
 #[test]
-fn client_that_sends_much_learns_the_refusal() {
+fn client_sending_large_body_receives_refusal() {
     let service = Service::new();
     ask_at(service.address(), &Question::post("/v1/sweep", " ".repeat(900_000))).refused(413, "body_too_large");
 }
@@ -345,7 +345,7 @@ fn body_that_stops_arriving_times_out() {
 }
 
 #[tokio::test]
-async fn a_body_is_json_by_its_content_type() {
+async fn content_type_must_be_json() {
     let service = Service::new();
     let of_type = |content_type: &str| Question::post_as(content_type, "/v1/sweep", shortest().to_string());
     for content_type in [
@@ -375,7 +375,7 @@ async fn a_body_is_json_by_its_content_type() {
 }
 
 #[tokio::test]
-async fn a_body_in_a_content_coding_is_refused() {
+async fn body_with_content_coding_is_refused() {
     let service = Service::new();
     for coding in ["gzip", "br", "gzip, gzip", "x"] {
         service.ask(&sweep().with("content-encoding", coding)).await.refused(415, "unsupported_media_type");
@@ -384,7 +384,7 @@ async fn a_body_in_a_content_coding_is_refused() {
 }
 
 #[tokio::test]
-async fn refusals_are_not_for_keeping() {
+async fn refusals_are_not_cacheable() {
     let service = Service::within(Limits { max_states: 10_000, ..LIMITS });
     for (answer, status, _) in provoked(&service).await {
         for header in ["etag", "cache-status"] {

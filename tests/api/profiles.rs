@@ -1,7 +1,7 @@
-//! The profiles as they come over HTTP, against curves that are worked out here in another way.
+//! Profiles over HTTP against independently calculated curves.
 //!
-//! The service samples over the tooth's position ψ, which it inverts for the cam's normal; here the angle φ of that normal is
-//! the parameter, so that nothing needs inverting (docs/theory.md section 2).
+//! The service samples over the tooth's position ψ and inverts it for the cam's normal. Here the angle φ of that normal
+//! is the parameter, so that nothing needs an inversion (docs/explanation/theory.md section 2).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -12,7 +12,7 @@ use crate::designs::{bored, shortest, undercut, with};
 
 pub(crate) type Point = (f64, f64);
 
-/// A drive's numbers.
+/// Parameters of a drive.
 #[derive(Clone, Copy)]
 struct Numbers {
     a: f64,
@@ -34,12 +34,12 @@ impl Numbers {
         }
     }
 
-    /// Half the angle between two teeth of the ring.
+    /// Returns half the angle between two teeth of the ring.
     fn half_pitch(&self) -> f64 {
         PI / self.ring_teeth
     }
 
-    /// Where a tooth that touches the cam at the normal angle φ stands: ψ in degrees, its centre, and its contact on the ring.
+    /// Returns a tooth that touches the cam at the normal angle φ: ψ in degrees, centre, and contact on the ring.
     fn tooth(&self, phi: f64) -> (f64, Point, Point) {
         let (sin, cos) = phi.sin_cos();
         let h = (self.a * cos).hypot(self.b * sin);
@@ -53,7 +53,7 @@ impl Numbers {
         (psi.to_degrees(), center, (center.0 + normal.0, center.1 + normal.1))
     }
 
-    /// The normal angle of a tooth at ψ, by bisection.
+    /// Returns the normal angle of a tooth at ψ, by bisection.
     fn normal_angle(&self, psi_deg: f64) -> f64 {
         let (mut low, mut high) = (0.0, FRAC_PI_2);
         for _ in 0..200 {
@@ -95,7 +95,7 @@ fn points(profile: &Value) -> Vec<Point> {
     x.into_iter().zip(y).collect()
 }
 
-/// Distance of a point from a polyline.
+/// Returns the distance of a point from a polyline.
 fn distance_from(polyline: &[Point], p: Point) -> f64 {
     let from_chord = |ends: &[Point]| {
         let (start, end) = (ends[0], ends[1]);
@@ -135,7 +135,7 @@ impl Geometry {
         self.answer["ring"]["tip_radius_mm"].as_f64().unwrap()
     }
 
-    /// The ring's flank on the side of positive angles, finely, root first.
+    /// Samples the ring's flank at positive angles, from the root.
     pub(crate) fn flank(&self, count: u32) -> Vec<Point> {
         let end = self.numbers.normal_angle(self.start_deg());
         (0..=count).map(|i| self.numbers.tooth(end * f64::from(i) / f64::from(count)).2).collect()
@@ -146,7 +146,7 @@ fn profile(extent: &str, chord_tolerance_mm: f64) -> Value {
     json!({ "extent": extent, "chord_tolerance_mm": chord_tolerance_mm })
 }
 
-/// A ring with more teeth than the carrier, and few of them.
+/// Returns a drive whose ring has few teeth, but more than the carrier.
 fn reversed() -> Value {
     json!({
         "drive": {
@@ -157,12 +157,12 @@ fn reversed() -> Value {
     })
 }
 
-/// A regular tip, an undercut one, a bored one, and a ring of few teeth.
+/// Returns drives with a regular, an undercut and a bored tip, and one with few ring teeth.
 fn drives() -> [Value; 4] {
     [shortest(), undercut(), bored(), reversed()]
 }
 
-/// The drives at several tolerances.
+/// Returns the drives at several tolerances.
 fn drives_and_tolerances(extent: &str) -> Vec<Value> {
     let drives = drives();
     let with_tolerance =
@@ -171,7 +171,7 @@ fn drives_and_tolerances(extent: &str) -> Vec<Value> {
 }
 
 #[tokio::test]
-async fn one_tooth_runs_from_one_symmetry_line_to_the_next() {
+async fn tooth_profile_spans_its_two_symmetry_lines() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let half = geometry.numbers.half_pitch();
@@ -185,7 +185,7 @@ async fn one_tooth_runs_from_one_symmetry_line_to_the_next() {
 }
 
 #[tokio::test]
-async fn copies_turned_by_a_tooth_join() {
+async fn copies_rotated_by_one_tooth_join() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         for curve in [&geometry.ring, &geometry.path] {
@@ -197,7 +197,7 @@ async fn copies_turned_by_a_tooth_join() {
 }
 
 #[tokio::test]
-async fn one_tooth_is_its_own_mirror_image() {
+async fn tooth_profile_is_mirror_symmetric() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         for curve in [&geometry.ring, &geometry.path] {
@@ -209,7 +209,7 @@ async fn one_tooth_is_its_own_mirror_image() {
 }
 
 #[tokio::test]
-async fn the_full_ring_is_closed_and_made_of_its_teeth() {
+async fn full_ring_is_closed_and_repeats_its_tooth() {
     for document in drives_and_tolerances("full") {
         let full = geometry(&document).await;
         let tooth = geometry(&with(&document, "/profile/extent", json!("tooth"))).await;
@@ -233,7 +233,7 @@ async fn the_full_ring_is_closed_and_made_of_its_teeth() {
 }
 
 #[tokio::test]
-async fn the_ring_runs_counter_clockwise_without_spikes() {
+async fn ring_runs_counter_clockwise_without_spikes() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         for curve in [&geometry.ring, &geometry.path] {
@@ -250,7 +250,7 @@ async fn the_ring_runs_counter_clockwise_without_spikes() {
 }
 
 #[tokio::test]
-async fn the_radii_of_the_answer_are_those_of_the_profile() {
+async fn reported_radii_are_those_of_profile() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let radii: Vec<_> = geometry.ring.iter().map(|&point| radius(point)).collect();
@@ -265,35 +265,35 @@ async fn the_radii_of_the_answer_are_those_of_the_profile() {
 }
 
 #[tokio::test]
-async fn a_regular_tip_is_flat_and_b_plus_2r_from_the_axis() {
+async fn regular_tip_is_flat_at_known_radius() {
     for document in [shortest(), reversed()] {
         let geometry = geometry(&with(&document, "/profile", profile("tooth", 1e-6))).await;
         let Numbers { b, r, .. } = geometry.numbers;
         assert!((geometry.tip_radius() - (b + 2.0 * r)).abs() <= 1e-12);
         let (tip, before) = (geometry.ring[geometry.ring.len() - 1], geometry.ring[geometry.ring.len() - 2]);
-        // The flank meets the symmetry line at a right angle, as nearly as the last chord shows it.
+        // The flank meets the symmetry line at a right angle, up to the length of the last chord.
         let inward = (radius(before) - radius(tip)) / distance(before, tip);
         assert!(inward.abs() < 0.05, "{inward}");
     }
 }
 
 #[tokio::test]
-async fn an_undercut_tip_ends_in_a_point_on_its_symmetry_line() {
+async fn undercut_tip_ends_in_point_on_symmetry_line() {
     let geometry = geometry(&with(&undercut(), "/profile", profile("tooth", 1e-6))).await;
     let Numbers { b, r, .. } = geometry.numbers;
     let tip = geometry.ring[geometry.ring.len() - 1];
     assert!(radius(tip) > b + 2.0 * r, "it is cut back");
-    // The flank itself gets there, at ψ_e, and not a land.
+    // The flank itself ends there, at ψ_e, without a land.
     let (_, _, end) = geometry.numbers.tooth(geometry.numbers.normal_angle(geometry.start_deg()));
     assert!(distance(end, tip) <= 1e-9, "{end:?} is not {tip:?}");
-    // Seen along the symmetry line the last chord falls inward steeply, and its mirror image on the next tooth rises so.
+    // Along the symmetry line the last chord falls steeply inward, and its mirror image on the next tooth rises.
     let before = geometry.ring[geometry.ring.len() - 2];
     let steepness = (radius(before) - radius(tip)) / distance(before, tip);
     assert!(steepness > 0.5, "the two flanks meet in a blunt {steepness}");
 }
 
 #[tokio::test]
-async fn a_bored_tip_has_its_land_on_the_bore_circle() {
+async fn bored_tip_has_land_on_bore_circle() {
     for tolerance in [1e-6, 1e-3, 1.0] {
         let geometry = geometry(&with(&bored(), "/profile", profile("tooth", tolerance))).await;
         assert_eq!(geometry.tip_radius(), 52.8227);
@@ -316,7 +316,7 @@ async fn a_bored_tip_has_its_land_on_the_bore_circle() {
 }
 
 #[tokio::test]
-async fn every_chord_of_the_ring_is_as_near_to_the_flank_as_was_asked() {
+async fn ring_chords_keep_tolerance() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let half: Vec<_> = geometry.ring.iter().copied().filter(|point| point.1 >= 0.0).collect();
@@ -326,7 +326,7 @@ async fn every_chord_of_the_ring_is_as_near_to_the_flank_as_was_asked() {
 }
 
 #[tokio::test]
-async fn every_chord_of_the_path_is_as_near_to_the_path_as_was_asked() {
+async fn path_chords_keep_tolerance() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let half: Vec<_> = geometry.path.iter().copied().filter(|point| point.1 >= 0.0).collect();
@@ -339,11 +339,11 @@ async fn every_chord_of_the_path_is_as_near_to_the_path_as_was_asked() {
 }
 
 #[tokio::test]
-async fn every_point_of_the_ring_lies_on_the_flank_or_its_land_and_every_point_of_the_path_on_the_path() {
+async fn points_of_ring_and_path_lie_on_curves() {
     for document in drives() {
         let document = with(&document, "/profile", profile("tooth", 1e-3));
         let geometry = geometry(&document).await;
-        // So fine that its own chords are 1e-9 mm away from the curve.
+        // These chords are within 1e-9 mm of the curve.
         let flank = geometry.flank(50_000);
         let path: Vec<_> =
             (0..=50_000).map(|i| geometry.numbers.tooth(FRAC_PI_2 * f64::from(i) / 50_000.0).1).collect();
@@ -362,7 +362,7 @@ async fn every_point_of_the_ring_lies_on_the_flank_or_its_land_and_every_point_o
 }
 
 #[tokio::test]
-async fn the_ring_is_r_away_from_the_path_everywhere_and_nowhere_nearer() {
+async fn ring_keeps_tooth_radius_from_path() {
     for document in drives() {
         let geometry = geometry(&with(&document, "/profile", profile("tooth", 1e-3))).await;
         let full: Vec<_> = (-2_000..=2_000)
@@ -382,7 +382,7 @@ async fn the_ring_is_r_away_from_the_path_everywhere_and_nowhere_nearer() {
 }
 
 #[tokio::test]
-async fn the_wave_generator_is_a_closed_ellipse_as_true_as_was_asked() {
+async fn wave_generator_is_closed_ellipse_within_tolerance() {
     for document in drives_and_tolerances("tooth") {
         let geometry = geometry(&document).await;
         let Numbers { a, b, tolerance_mm, .. } = geometry.numbers;
@@ -414,12 +414,12 @@ async fn the_wave_generator_is_a_closed_ellipse_as_true_as_was_asked() {
 }
 
 #[tokio::test]
-async fn a_finer_tolerance_takes_more_points_but_not_many_more_than_it_must() {
+async fn finer_tolerance_takes_few_more_points_than_needed() {
     for document in drives() {
         let count =
             async |tolerance: f64| geometry(&with(&document, "/profile", profile("tooth", tolerance))).await.ring.len();
         let (coarse, fine) = (count(1e-4).await, count(1e-6).await);
-        // Chords over a smooth arc: ten times as many for a hundredth of the tolerance.
+        // A smooth arc needs ten times as many chords for a hundredth of the tolerance.
         assert!(fine > 4 * coarse && fine < 25 * coarse, "{coarse} and {fine} points");
     }
 }

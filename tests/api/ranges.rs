@@ -1,11 +1,11 @@
-//! The ranges that the contract promises: both ends belong to them, and what is just beyond is refused.
+//! The documented ranges. Both ends are accepted, and values just beyond are refused.
 
 use serde_json::{Value, json};
 
 use crate::asking::{LIMITS, Limits, Service};
 use crate::designs::{eccentric, every_number, fixed, spelled_out, with};
 
-/// A field, the endpoint that reads it, a document that holds it, and its range.
+/// A field with its range, the endpoint that reads it, and a document that holds it.
 struct Field {
     pointer: String,
     path: &'static str,
@@ -112,7 +112,7 @@ fn fields() -> Vec<Field> {
     fields.push(modification("carrier_rotation_arcsec", -1e5, 1e5));
     fields.push(modification("ring_tip_relief/amount_um", -1e6, 1e6));
     fields.push(modification("ring_tip_relief/power", 0.1, 100.0));
-    // One entry after the other would be another document each.
+    // Testing each entry would need another document each.
     let items = |count: usize| vec![0.0; count];
     let deviating = with(
         &with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work" })),
@@ -142,9 +142,9 @@ fn fields() -> Vec<Field> {
     fields
 }
 
-/// The limit that the service says the value is beyond, if it says so of this field.
+/// Returns the exceeded limit if the service reports one at this field.
 async fn limit_exceeded(field: &Field, value: f64) -> Option<f64> {
-    // A small limit, so that a sweep of many samples is refused for that alone, and soon.
+    // With a small limit, a sweep of many samples is refused quickly and only for that.
     let service = Service::within(Limits { max_states: 1_000, ..LIMITS });
     let document = with(&field.document, &field.pointer, json!(value));
     let answer = service.post(field.path, &document).await;
@@ -171,7 +171,7 @@ async fn both_ends_of_every_range_are_accepted() {
 }
 
 #[tokio::test]
-async fn a_value_just_beyond_its_range_is_refused_with_the_limit() {
+async fn value_beyond_range_is_refused_with_limit() {
     for field in fields() {
         let beyond = if field.is_whole {
             [field.low - 1.0, field.high + 1.0]
@@ -210,14 +210,14 @@ async fn poissons_ratio_lies_strictly_between_its_limits() {
 }
 
 #[tokio::test]
-async fn every_number_of_the_document_has_a_range() {
+async fn every_number_has_a_range() {
     let known: Vec<_> = fields().into_iter().map(|field| field.pointer).collect();
     for pointer in crate::designs::pointers(&every_number(), Value::is_number) {
         assert!(known.contains(&pointer) || pointer.ends_with("/poissons_ratio"), "{pointer}");
     }
 }
 
-/// A drive of this size, all else in proportion.
+/// Returns a drive scaled in proportion.
 fn scaled(scale: f64) -> Value {
     json!({
         "drive": {
@@ -232,14 +232,15 @@ fn scaled(scale: f64) -> Value {
 }
 
 #[tokio::test]
-async fn the_smallest_and_the_largest_drive_are_answered_like_any_other() {
+async fn smallest_and_largest_drive_are_answered() {
     let service = Service::new();
     for scale in [1e-6 / 5.0, 1e-3, 1.0, 1e3, 1e6 / 58.0] {
         for path in crate::asking::ENDPOINTS {
             let found = service.post(path, &scaled(scale)).await.found();
             let is_crushed = scale < 1e-2 && path == "/v1/sweep";
             let codes: Vec<_> = found["findings"].as_array().unwrap().iter().map(|one| &one["code"]).collect();
-            // Under 20 N·m a drive of a hundredth of the size is pressed flat: its stresses, and in the end its wind-up too, are beyond everything.
+            // Under 20 N·m a drive of a hundredth of the size is overloaded: all stresses, and finally the wind-up,
+            // exceed their limits.
             let stresses = codes.iter().filter(|&&code| code == "stress_above_fatigue_limit").count();
             assert_eq!(stresses, usize::from(is_crushed) * 3, "{scale}: {codes:?}");
             assert!(
@@ -248,7 +249,7 @@ async fn the_smallest_and_the_largest_drive_are_answered_like_any_other() {
             );
         }
         let found = service.post("/v1/sweep", &scaled(scale)).await.found();
-        // Forces go with torque over length, stresses with the root of torque over volume.
+        // Forces scale as torque over length, stresses as the root of torque over volume.
         let force_n = found["peaks"]["wave_generator"]["force_n"]["value"].as_f64().unwrap() * scale;
         assert!((force_n / 1_429.443_293_502_519 - 1.0).abs() < 1e-9, "{force_n}");
         let stress_mpa = found["peaks"]["wave_generator"]["stress_mpa"]["value"].as_f64().unwrap() * scale.powf(1.5);
@@ -257,7 +258,7 @@ async fn the_smallest_and_the_largest_drive_are_answered_like_any_other() {
 }
 
 #[tokio::test]
-async fn the_weakest_and_the_strongest_of_everything_else_is_answered_with_numbers() {
+async fn extreme_values_give_finite_numbers() {
     let service = Service::new();
     let soft = json!({ "youngs_modulus_gpa": 1e-3, "poissons_ratio": (-1.0_f64).next_up() });
     let hard = json!({ "youngs_modulus_gpa": 1e5, "poissons_ratio": 0.5_f64.next_down() });

@@ -1,4 +1,4 @@
-//! The six rules of the service, each by a test that exceeds it.
+//! The six rules of the service. Each test exceeds one of them.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -18,7 +18,7 @@ const BATCHES_RUNNING: &str = "toothwave_batches_running";
 
 const ONE_SOLVE: Limits = Limits { max_concurrent_solves: 1, ..ENDLESS };
 
-/// A sweep whose answer has some 30 MB; each number is another one.
+/// Returns a request for a sweep whose answer has about 30 MB. Each number gives another sweep.
 fn large(number: u32) -> Question {
     Question::post("/v1/sweep", with(&shortest(), "/sweep", json!({ "samples": 20_000 + number })).to_string())
 }
@@ -107,7 +107,7 @@ fn unread_answers_never_exceed_budget() {
     let budget_bytes = 160 << 20;
     let service = Service::within(Limits { max_unread_bytes: budget_bytes, cache_max_bytes: 0, ..LIMITS });
     let unread: Vec<_> = (0..12).map(|number| service.send(&large(number))).collect();
-    // Health and small answers come all the same, and the reservations never add up to more.
+    // Health and small answers still arrive, and reservations never exceed the budget.
     for number in 0..50 {
         assert_eq!(ask_at(service.address(), &small(30.0 + f64::from(number))).status, 200);
         assert!(service.metric(UNREAD_BYTES) <= budget_bytes as f64);
@@ -168,7 +168,7 @@ fn head_over_limit_is_refused() {
 
 // --- The log
 
-/// A pipe holds 64 KiB, some 250 lines.
+/// A pipe holds 64 KiB, about 250 lines.
 #[test]
 fn stuck_log_reader_blocks_nothing() {
     let process = Process::logging(&["serve"], Stdio::piped());

@@ -1,4 +1,4 @@
-//! The service as a process: started, asked, and told to stop.
+//! The process of the service: start, requests and stop.
 
 use std::io::{BufRead as _, BufReader};
 use std::net::{SocketAddr, TcpListener};
@@ -15,22 +15,22 @@ use crate::designs::{shortest, with};
 pub(crate) struct Process {
     pub(crate) child: Child,
     pub(crate) address: SocketAddr,
-    /// Kept open: a process that greets into a closed pipe would fail for that.
+    /// Kept open, because the process fails if it greets into a closed pipe.
     _greeting: BufReader<ChildStdout>,
 }
 
 impl Process {
-    /// Started with these arguments on a port of the system's choice, which its greeting names.
+    /// Starts a process with these arguments on a free port, which its greeting names.
     pub(crate) fn started(arguments: &[&str]) -> Self {
         Self::logging(&[arguments, &["--log", "off"]].concat(), Stdio::null())
     }
 
-    /// The same, with its log at the default level.
+    /// Starts a process with its log at the default level.
     pub(crate) fn logging(arguments: &[&str], log: Stdio) -> Self {
         Self::of(Command::new(env!("CARGO_BIN_EXE_toothwave")).args(arguments), log)
     }
 
-    /// The same, started by this command.
+    /// Starts a process with this command.
     pub(crate) fn of(command: &mut Command, log: Stdio) -> Self {
         command.args(["--listen", "127.0.0.1:0"]);
         let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(log).spawn().unwrap();
@@ -46,7 +46,7 @@ impl Process {
         assert!(status.success());
     }
 
-    /// Its exit status; a process that does not end fails the test instead of holding it up.
+    /// Waits for the exit status. Fails if the process does not end.
     pub(crate) fn ended(mut self) -> ExitStatus {
         for _ in 0..60_000 {
             if let Some(status) = self.child.try_wait().unwrap() {
@@ -60,7 +60,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // Already gone where the test asked it to end.
+        // The process may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -71,7 +71,7 @@ fn sweep(samples: u32) -> Question {
 }
 
 #[test]
-fn the_service_serves_with_and_without_saying_serve() {
+fn serves_with_and_without_subcommand_serve() {
     for arguments in [&["serve"][..], &[]] {
         let process = Process::started(arguments);
         ask_at(process.address, &sweep(50)).found();
@@ -120,17 +120,17 @@ fn settings_become_limits() {
 }
 
 #[test]
-fn an_origin_that_was_named_may_call_from_a_browser() {
+fn named_origin_may_call_from_browser() {
     let process = Process::started(&["serve", "--cors-origin", "https://one.example,https://two.example"]);
     let answer = ask_at(process.address, &sweep(50).with("origin", "https://two.example"));
     assert_eq!(answer.header("access-control-allow-origin"), "https://two.example");
 }
 
 #[test]
-fn every_request_has_one_log_line_without_a_number_of_its_design() {
+fn each_request_logs_one_line_without_design_numbers() {
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("log-{}", std::process::id()));
     let process = Process::logging(&["serve"], std::fs::File::create(&path).unwrap().into());
-    // A torque that nothing else has anything of.
+    // No other number contains this torque.
     let design = with(&shortest(), "/load/input_torque_nm", json!(17.931)).to_string();
     let question = Question::post("/v1/sweep", design).with("x-request-id", "drawing-4711");
     for _ in 0..2 {
@@ -162,7 +162,7 @@ fn every_request_has_one_log_line_without_a_number_of_its_design() {
 }
 
 #[test]
-fn a_process_that_is_told_to_stop_exits_with_0() {
+fn terminated_process_exits_with_0() {
     for signal in ["-TERM", "-INT"] {
         let process = Process::started(&["serve"]);
         ask_at(process.address, &sweep(50)).found();
@@ -172,11 +172,11 @@ fn a_process_that_is_told_to_stop_exits_with_0() {
 }
 
 #[test]
-fn a_request_that_runs_when_the_process_is_told_to_stop_is_answered_first() {
+fn running_request_is_answered_before_exit() {
     let process = Process::started(&["serve", "--deadline-ms", "600000", "--shutdown-ms", "600000"]);
     let address = process.address;
     let asker = std::thread::spawn(move || ask_at(address, &sweep(30_000)));
-    // Some rounds until the solve has begun; should it be quick, the answer is there before the signal all the same.
+    // Waits until the solve has begun. A fast solve answers before the signal, which is fine too.
     for _ in 0..10_000 {
         let metrics = ask_at(address, &Question::of("GET", "/metrics"));
         if metrics.text().contains("toothwave_solves_running 1") || asker.is_finished() {
@@ -191,7 +191,7 @@ fn a_request_that_runs_when_the_process_is_told_to_stop_is_answered_first() {
 }
 
 #[test]
-fn an_address_that_is_taken_is_an_error_that_names_it() {
+fn used_address_is_an_error_naming_it() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
     let output = Command::new(env!("CARGO_BIN_EXE_toothwave")).args(["serve", "--listen", &address]).output().unwrap();
@@ -201,11 +201,11 @@ fn an_address_that_is_taken_is_an_error_that_names_it() {
 }
 
 #[test]
-fn a_limit_that_nothing_can_hold_is_no_reason_to_panic() {
+fn huge_limit_does_not_panic() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
     for limit in ["--max-states", "--max-concurrent-solves"] {
-        // Whether it is refused or taken for "no limit": with this address the process ends in any case.
+        // The limit may be refused or accepted, but the used address ends the process.
         let arguments = ["serve", "--listen", &address, limit, "18446744073709551615"];
         let output = Command::new(env!("CARGO_BIN_EXE_toothwave")).args(arguments).output().unwrap();
         assert!(matches!(output.status.code(), Some(1 | 2)), "{limit}: {:?}", output.status);
@@ -213,7 +213,7 @@ fn a_limit_that_nothing_can_hold_is_no_reason_to_panic() {
 }
 
 #[test]
-fn a_body_larger_than_the_limit_is_refused_over_a_connection_too() {
+fn body_over_limit_is_refused_over_connection() {
     let process = Process::started(&["serve"]);
     let question = Question::post("/v1/sweep", " ".repeat(LIMITS.max_body_bytes + 1));
     let problem = ask_at(process.address, &question).refused(413, "body_too_large");

@@ -1,4 +1,4 @@
-//! How a process stops: in order, without a lost request.
+//! Graceful shutdown without lost requests.
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -9,8 +9,8 @@ use std::time::Duration;
 use crate::asking::{ENDLESS, LIMITS, Question, Service, answer_on, ask_at};
 use crate::serving::Process;
 
-/// A client that asks again and again on a connection that it keeps, and opens another one only when it was told that this one ends.
-/// Returns how many requests were answered, or what became of one that was not.
+/// Sends requests on one connection and opens another one only after the service announces its end.
+/// Returns the number of answered requests, or the failure of an unanswered one.
 fn keeps_asking(address: SocketAddr, is_stopping: &AtomicBool) -> Result<usize, String> {
     let mut answered = 0;
     while let Ok(mut stream) = TcpStream::connect(address) {
@@ -73,7 +73,7 @@ fn silent_connection_delays_no_stop() {
 }
 
 #[test]
-fn computation_beyond_shutdown_is_told_so() {
+fn computation_beyond_shutdown_gets_problem() {
     let service = Service::with(ENDLESS, &["--shutdown-ms", "1"]);
     let running = service.occupied_by(1);
     service.process().signalled("-TERM");
@@ -100,7 +100,7 @@ fn second_signal_stops_at_once() {
         let _running = service.occupied_by(1);
         let process = service.into_process();
         process.signalled("-TERM");
-        // The first one is taken up before the second one comes.
+        // The first signal is handled before the second arrives.
         let is_ready = || {
             let mut stream = TcpStream::connect(process.address).ok()?;
             stream.write_all(b"GET /health/ready HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n").ok()?;

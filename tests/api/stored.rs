@@ -1,4 +1,4 @@
-//! Studies that are kept in a file, over restarts and whatever happens to the file.
+//! Studies in a file: restarts, damage and other builds.
 
 use std::fs;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use crate::serving::Process;
 
 const EXPIRY_S: u64 = 100_000;
 
-/// A file of its own, gone with it.
+/// A temporary file.
 struct File(PathBuf);
 
 impl File {
@@ -29,7 +29,7 @@ impl File {
         self.0.to_str().unwrap()
     }
 
-    /// Changes what is kept, while no service has it open; how many rows.
+    /// Changes the file's rows while no service has it open. Returns their number.
     fn change(&self, text: &str) -> usize {
         Connection::open(&self.0).unwrap().execute(text, []).unwrap()
     }
@@ -56,7 +56,7 @@ impl Keeper {
         Self(Service::with(limits, &["--studies", file.path(), &expiry]))
     }
 
-    /// The process is told to stop, and has.
+    /// Stops the process and waits for its end.
     fn end(self) {
         let process = self.0.into_process();
         process.signalled("-TERM");
@@ -88,7 +88,7 @@ fn map(steps: u64) -> Value {
     })
 }
 
-/// As many variants as take a while.
+/// Returns a study that runs for a while.
 fn long() -> Value {
     let mut study = map(300);
     study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 300 });
@@ -103,18 +103,18 @@ fn result(study: &Value) -> String {
     format!("{}/result", place(study))
 }
 
-/// The result of a study that nothing disturbs.
-async fn undisturbed(study: &Value) -> Value {
+/// Returns the result of an undisturbed study.
+async fn undisturbed_result(study: &Value) -> Value {
     Service::new().ask(&waiting(study)).await.found()["result"].clone()
 }
 
-fn begun_at(process: &Process, study: &Value) -> Value {
+fn start_at(process: &Process, study: &Value) -> Value {
     let answer = ask_at(process.address, &Question::post("/v1/studies", study.to_string()));
     assert_eq!(answer.status, 202, "{}", answer.text());
     answer.json()
 }
 
-/// The study once something is true of how it stands.
+/// Waits until the study's status meets a condition.
 fn once(process: &Process, study: &Value, is_true: impl Fn(&Value) -> bool) -> Value {
     loop {
         let stands = ask_at(process.address, &Question::of("GET", &place(study))).found();
@@ -126,7 +126,7 @@ fn once(process: &Process, study: &Value, is_true: impl Fn(&Value) -> bool) -> V
 }
 
 #[tokio::test]
-async fn file_and_memory_give_the_same_bytes() {
+async fn file_and_memory_give_same_bytes() {
     let (file, memory) = (File::new(), Service::new());
     let keeper = Keeper::of(&file);
     let tolerance = json!({
@@ -150,10 +150,10 @@ async fn file_and_memory_give_the_same_bytes() {
 }
 
 #[tokio::test]
-async fn a_killed_service_continues_with_the_same_bits() {
+async fn killed_service_continues_with_same_bits() {
     let file = File::new();
     let process = Process::started(&["serve", "--studies", file.path()]);
-    let study = begun_at(&process, &long());
+    let study = start_at(&process, &long());
     let stands = once(&process, &study, |stands| stands["looked_at"].as_u64() > Some(1000));
     assert_eq!(stands["state"], "running");
     process.signalled("-KILL");
@@ -162,19 +162,19 @@ async fn a_killed_service_continues_with_the_same_bits() {
     let stands = once(&process, &study, |stands| stands["state"] != "running");
     assert_eq!((&stands["state"], &stands["looked_at"]), (&json!("done"), &json!(90_000)));
     let found = ask_at(process.address, &Question::of("GET", &result(&study))).found();
-    assert!(found == undisturbed(&long()).await);
+    assert!(found == undisturbed_result(&long()).await);
 }
 
-/// A limit on the size of files is a full disk to whoever writes.
+/// A limit on file size acts like a full disk.
 #[tokio::test]
-async fn a_full_disk_fails_the_study_and_nothing_else() {
+async fn full_disk_fails_only_the_study() {
     let file = File::new();
     let mut command = Command::new("bash");
     let script = "ulimit -f 300; exec \"$0\" serve --log off --studies \"$1\" \"${@:2}\"";
     command.args(["-c", script, env!("CARGO_BIN_EXE_toothwave"), file.path()]);
     let process = Process::of(&mut command, Stdio::null());
     let small = ask_at(process.address, &waiting(&map(5))).found();
-    let study = begun_at(&process, &long());
+    let study = start_at(&process, &long());
     let stands = once(&process, &study, |stands| stands["state"] != "running");
     assert_eq!((&stands["state"], &stands["problem"]["code"]), (&json!("failed"), &json!("store_unavailable")));
     assert!(stands["looked_at"].as_u64() < Some(90_000), "{stands}");
@@ -183,11 +183,11 @@ async fn a_full_disk_fails_the_study_and_nothing_else() {
     process.ended();
     let keeper = Keeper::of(&file);
     assert_eq!(keeper.0.get(&result(&small)).await.found(), small["result"]);
-    assert!(keeper.wait_for(&long()).await["result"] == undisturbed(&long()).await);
+    assert!(keeper.wait_for(&long()).await["result"] == undisturbed_result(&long()).await);
     keeper.end();
 }
 
-fn refused_at_the_start(file: &File) -> String {
+fn refusal_at_start(file: &File) -> String {
     let mut command = Command::new("timeout");
     let service = ["60", env!("CARGO_BIN_EXE_toothwave"), "serve", "--listen", "127.0.0.1:0", "--studies"];
     let output = command.args(service).arg(file.path()).output().unwrap();
@@ -196,40 +196,40 @@ fn refused_at_the_start(file: &File) -> String {
 }
 
 #[test]
-fn a_file_of_another_schema_is_refused_with_both_versions() {
+fn other_schema_version_is_refused_with_both_versions() {
     let file = File::new();
     file.change("CREATE TABLE schema_versions (version BIGINT PRIMARY KEY, applied_at_s BIGINT NOT NULL)");
     file.change("INSERT INTO schema_versions VALUES (4, 0)");
-    let error = refused_at_the_start(&file);
+    let error = refusal_at_start(&file);
     assert!(error.contains("schema 4") && error.contains("schema 5") && error.contains(file.path()), "{error}");
     fs::remove_file(&file.0).unwrap();
     Keeper::of(&file).end();
     Connection::open(&file.0).unwrap().pragma_update(None, "user_version", 6).unwrap();
-    let error = refused_at_the_start(&file);
+    let error = refusal_at_start(&file);
     assert!(error.contains("schema 6"), "{error}");
 }
 
 #[test]
-fn a_file_of_something_else_is_left_alone() {
+fn foreign_file_is_left_alone() {
     let file = File::new();
     file.change("CREATE TABLE accounts (name TEXT)");
     let before = fs::read(&file.0).unwrap();
-    assert!(refused_at_the_start(&file).contains("something else"));
+    assert!(refusal_at_start(&file).contains("another program"));
     assert!(fs::read(&file.0).unwrap() == before);
     fs::write(&file.0, [b'x'; 10_000]).unwrap();
-    assert!(refused_at_the_start(&file).contains("damaged"));
+    assert!(refusal_at_start(&file).contains("damaged"));
 }
 
 #[test]
-fn a_file_serves_one_process() {
+fn file_serves_one_process() {
     let file = File::new();
     let _process = Process::started(&["serve", "--studies", file.path()]);
-    let error = refused_at_the_start(&file);
+    let error = refusal_at_start(&file);
     assert!(error.contains("another process") && error.contains(file.path()), "{error}");
 }
 
 #[tokio::test]
-async fn a_cancelled_study_continues_after_a_restart() {
+async fn cancelled_study_continues_after_restart() {
     let file = File::new();
     let keeper = Keeper::of(&file);
     let study = keeper.ask(&long()).await.json();
@@ -239,7 +239,7 @@ async fn a_cancelled_study_continues_after_a_restart() {
     keeper.end();
     let keeper = Keeper::of(&file);
     assert_eq!(keeper.0.get(&place(&study)).await.found(), cancelled);
-    assert!(keeper.wait_for(&long()).await["result"] == undisturbed(&long()).await);
+    assert!(keeper.wait_for(&long()).await["result"] == undisturbed_result(&long()).await);
     assert_eq!(keeper.delete(&study).await, 204);
     keeper.0.get(&place(&study)).await.refused(404, "not_found");
     keeper.end();
@@ -247,9 +247,9 @@ async fn a_cancelled_study_continues_after_a_restart() {
     assert_eq!(keeper.delete(&study).await, 404);
 }
 
-/// Each result is refused; a study that runs is computed again as far as it is damaged, or refused.
+/// Each damaged result is refused. A running study is computed again or refused.
 #[tokio::test]
-async fn damage_to_the_file_never_becomes_a_number() {
+async fn damaged_file_never_gives_wrong_number() {
     let file = File::new();
     let keeper = Keeper::of(&file);
     let study = keeper.wait_for(&map(500)).await;
@@ -265,7 +265,7 @@ async fn damage_to_the_file_never_becomes_a_number() {
         let keeper = Keeper::of(&file);
         let problem = keeper.0.get(&result(&study)).await.refused(500, "internal_error");
         assert!(problem["detail"].as_str().unwrap().contains("damaged"), "{damage}: {problem}");
-        // Whoever follows the advice has it again.
+        // The advice in the problem restores the study.
         assert_eq!(keeper.delete(&study).await, 204);
         assert_eq!(keeper.wait_for(&map(500)).await, study);
         keeper.end();
@@ -287,7 +287,7 @@ async fn study_with_damaged_document_is_removed() {
     keeper.end();
 }
 
-/// Pages that SQLite itself finds broken.
+/// SQLite itself detects that these pages are broken.
 #[tokio::test]
 async fn broken_pages_are_a_problem() {
     let file = File::new();
@@ -315,7 +315,7 @@ async fn parts_of_another_build_are_computed_again() {
     file.change(&format!("UPDATE parts SET study = 'other' WHERE study = '{id}'"));
     file.change("UPDATE studies SET origin = 'another'");
     let keeper = Keeper::of(&file);
-    // The result of one that does not run would have other bits in this build.
+    // A finished study's result would have other bits in this build.
     keeper.0.get(&place(&done)).await.refused(404, "not_found");
     while keeper.0.get("/v1/studies/other").await.found()["state"] == "running" {
         tokio::task::yield_now().await;
@@ -323,14 +323,14 @@ async fn parts_of_another_build_are_computed_again() {
     assert_eq!(keeper.0.get("/v1/studies/other/result").await.found(), running["result"]);
     keeper.end();
     assert_eq!(file.change("DELETE FROM parts WHERE study <> 'other'"), 0);
-    // The next start finds it whole.
+    // The next start finds a complete study.
     let keeper = Keeper::of(&file);
     assert_eq!(keeper.0.get("/v1/studies/other/result").await.found(), running["result"]);
     keeper.end();
 }
 
 #[tokio::test]
-async fn asking_keeps_a_study_from_expiring() {
+async fn reading_a_study_delays_its_expiry() {
     for read in ["", "/result", "/events"] {
         let file = File::new();
         let age = |seconds: u64| file.change(&format!("UPDATE studies SET asked_at_s = asked_at_s - {seconds}"));
@@ -363,7 +363,7 @@ async fn stored_study_outlives_smaller_limits() {
 }
 
 #[tokio::test]
-async fn a_service_without_studies_says_so() {
+async fn service_without_studies_says_so() {
     let service = Service::with(LIMITS, &["--studies", "off"]);
     let problem = service.ask(&waiting(&map(5))).await.refused(501, "studies_off");
     assert!(problem["detail"].as_str().unwrap().contains("--studies off"), "{problem}");

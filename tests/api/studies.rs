@@ -1,4 +1,4 @@
-//! Studies over HTTP: asked, waited for, watched, cancelled, gone on with, refused.
+//! Studies over HTTP: start, wait, events, cancel, resume and refusals.
 
 use std::io::Read as _;
 use std::time::Duration;
@@ -20,23 +20,23 @@ fn map(base: &Value, steps: u64) -> Value {
     })
 }
 
-/// As many variants as take a while.
+/// Returns a study that runs for a while.
 fn long() -> Value {
     let mut study = map(&shortest(), 300);
     study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 300 });
     study
 }
 
-/// As many variants, each of which takes longer than any test.
+/// Returns a study with this many variants, each slower than any test.
 fn slow(steps: u64) -> Value {
     map(&with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })), steps)
 }
 
-async fn begun(service: &Service, study: &Value) -> Answer {
+async fn start_study(service: &Service, study: &Value) -> Answer {
     service.ask(&Question::post("/v1/studies", study.to_string())).await
 }
 
-async fn waited_for(service: &Service, study: &Value) -> Value {
+async fn wait_for(service: &Service, study: &Value) -> Value {
     service.ask(&Question::post("/v1/studies", study.to_string()).with("prefer", WAIT)).await.found()
 }
 
@@ -44,14 +44,14 @@ fn place(study: &Value) -> String {
     format!("/v1/studies/{}", study["id"].as_str().unwrap())
 }
 
-async fn deleted(service: &Service, place: &str) -> u16 {
+async fn delete(service: &Service, place: &str) -> u16 {
     service.ask(&Question::of("DELETE", place)).await.status
 }
 
 #[tokio::test]
-async fn who_waits_for_a_study_gets_its_result_with_it() {
+async fn waiting_client_gets_study_with_result() {
     let service = Service::new();
-    let found = waited_for(&service, &map(&shortest(), 5)).await;
+    let found = wait_for(&service, &map(&shortest(), 5)).await;
     assert_eq!((&found["state"], &found["study"]), (&json!("done"), &json!("map")));
     assert_eq!((&found["variants"], &found["looked_at"], &found["impossible"]), (&json!(5), &json!(5), &json!(0)));
     assert_eq!(service.get(found["result_href"].as_str().unwrap()).await.found(), found["result"]);
@@ -63,9 +63,9 @@ async fn who_waits_for_a_study_gets_its_result_with_it() {
     }
 }
 
-/// Seconds of three thousand years: as RFC 7240 has it, a number of any length.
+/// RFC 7240 allows a number of any length.
 #[tokio::test]
-async fn who_would_wait_for_ever_waits_as_long_as_anybody() {
+async fn wait_preference_may_have_any_length() {
     let service = Service::new();
     for (steps, wait) in [(5, "wait=99999999999"), (6, "wait=18446744073709551616")] {
         let asked = Question::post("/v1/studies", map(&shortest(), steps).to_string());
@@ -76,9 +76,9 @@ async fn who_would_wait_for_ever_waits_as_long_as_anybody() {
 }
 
 #[tokio::test]
-async fn who_does_not_wait_is_told_where_the_study_stands_and_its_events_end_with_it() {
+async fn study_without_wait_has_status_and_events() {
     let service = Service::new();
-    let answer = begun(&service, &map(&shortest(), 5)).await;
+    let answer = start_study(&service, &map(&shortest(), 5)).await;
     assert_eq!(answer.status, 202, "{}", answer.text());
     let study = answer.json();
     assert_eq!(format!("/v1/{}", answer.header("location")), place(&study));
@@ -91,11 +91,11 @@ async fn who_does_not_wait_is_told_where_the_study_stands_and_its_events_end_wit
     assert_eq!(service.get(&place(&study)).await.found(), told);
 }
 
-/// A chunk may take minutes, and a proxy closes a connection on which nothing is sent.
+/// A chunk may take minutes, and a proxy closes a silent connection.
 #[tokio::test]
-async fn events_come_at_once_and_then_as_comments() {
+async fn first_event_comes_at_once_and_comments_follow() {
     let service = Service::within(ENDLESS);
-    let study = begun(&service, &slow(1)).await.json();
+    let study = start_study(&service, &slow(1)).await.json();
     let mut events = service.send(&Question::of("GET", study["events_href"].as_str().unwrap()));
     let (mut read, mut buffer) = (String::new(), [0; 4096]);
     // A comment is a line that begins with a colon (HTML Living Standard, section 9.2).
@@ -104,41 +104,41 @@ async fn events_come_at_once_and_then_as_comments() {
         assert!(length > 0, "{read}");
         read.push_str(&String::from_utf8_lossy(&buffer[..length]));
     }
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(delete(&service, &place(&study)).await, 204);
 }
 
 #[tokio::test]
-async fn the_same_question_is_the_same_study_however_it_is_spelled() {
+async fn equal_question_is_same_study_however_spelled() {
     let service = Service::new();
-    let first = waited_for(&service, &map(&shortest(), 3)).await;
+    let first = wait_for(&service, &map(&shortest(), 3)).await;
     let spelled = map(&shortest(), 3).to_string().replace("3.0", "3e0").replace("28,", "28.0,");
     let other = service.ask(&Question::post("/v1/studies", spelled).with("prefer", WAIT)).await.found();
     assert_eq!(first["id"], other["id"]);
-    assert_ne!(first["id"], waited_for(&service, &map(&shortest(), 4)).await["id"]);
+    assert_ne!(first["id"], wait_for(&service, &map(&shortest(), 4)).await["id"]);
 }
 
 #[tokio::test]
-async fn a_cancelled_study_continues_when_asked_again() {
+async fn cancelled_study_continues_when_requested_again() {
     let service = Service::new();
-    let study = begun(&service, &long()).await.json();
+    let study = start_study(&service, &long()).await.json();
     assert_eq!(study["state"], "running");
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(delete(&service, &place(&study)).await, 204);
     assert_eq!(service.get(&place(&study)).await.found()["state"], "cancelled");
     let partial = service.get(&format!("{}/result", place(&study))).await.found();
     assert_eq!(partial["is_complete"], false);
-    let found = waited_for(&service, &long()).await;
+    let found = wait_for(&service, &long()).await;
     assert_eq!((&found["id"], &found["state"], &found["looked_at"]), (&study["id"], &json!("done"), &json!(90_000)));
-    assert!(found["result"] == waited_for(&Service::new(), &long()).await["result"]);
-    // One that does not run any more is forgotten.
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert!(found["result"] == wait_for(&Service::new(), &long()).await["result"]);
+    // A study that no longer runs is deleted.
+    assert_eq!(delete(&service, &place(&study)).await, 204);
     service.get(&place(&study)).await.refused(404, "not_found");
-    assert_eq!(deleted(&service, &place(&study)).await, 404);
+    assert_eq!(delete(&service, &place(&study)).await, 404);
 }
 
 #[tokio::test]
-async fn a_cancelled_study_has_the_variants_it_counts() {
+async fn cancelled_study_has_the_variants_it_counts() {
     let service = Service::within(LIMITS);
-    let study = begun(&service, &long()).await.json();
+    let study = start_study(&service, &long()).await.json();
     let variants = async || {
         let partial = service.get(&format!("{}/result", place(&study))).await.found();
         let has = |what: &str| partial[what]["variant"].as_array().unwrap().len() as u64;
@@ -147,28 +147,28 @@ async fn a_cancelled_study_has_the_variants_it_counts() {
     while variants().await == 0 {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(delete(&service, &place(&study)).await, 204);
     let stands = service.get(&place(&study)).await.found();
     let variants = variants().await;
     assert_eq!((&stands["state"], &stands["looked_at"]), (&json!("cancelled"), &json!(variants)));
     assert!(variants < 90_000, "{variants}");
 }
 
-/// What runs and is not kept could be cancelled by nobody, and would count nowhere.
+/// Nobody could cancel a study that runs but is not listed.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn however_many_ask_for_a_study_and_cancel_it_at_once_none_runs_that_is_not_kept() {
+async fn concurrent_requests_and_cancels_leave_no_unlisted_study() {
     let service = Service::new();
-    let study = begun(&service, &long()).await.json();
+    let study = start_study(&service, &long()).await.json();
     let clients = (0..16).map(|client| {
         let (service, place) = (service.clone(), place(&study));
         tokio::spawn(async move {
             for turn in 0..60 {
                 if (client + turn) % 2 == 0 {
-                    let answer = begun(&service, &long()).await;
+                    let answer = start_study(&service, &long()).await;
                     // 404: another client cancelled and deleted it before its answer was read.
                     assert!(matches!(answer.status, 200 | 202 | 404), "{}", answer.text());
                 } else {
-                    assert!(matches!(deleted(&service, &place).await, 204 | 404));
+                    assert!(matches!(delete(&service, &place).await, 204 | 404));
                 }
             }
         })
@@ -176,25 +176,25 @@ async fn however_many_ask_for_a_study_and_cancel_it_at_once_none_runs_that_is_no
     for client in clients.collect::<Vec<_>>() {
         client.await.unwrap();
     }
-    while deleted(&service, &place(&study)).await != 404 {}
+    while delete(&service, &place(&study)).await != 404 {}
     service.until("toothwave_studies_running", 0.0);
 }
 
 #[tokio::test]
-async fn a_single_request_does_not_wait_for_a_study() {
+async fn single_request_does_not_wait_for_study() {
     let service = Service::within(Limits { max_concurrent_solves: 1, ..LIMITS });
-    let study = begun(&service, &long()).await.json();
+    let study = start_study(&service, &long()).await.json();
     service.post("/v1/sweep", &spelled_out()).await.found();
     let stands = service.get(&place(&study)).await.found();
     assert_eq!(stands["state"], "running", "{stands}");
-    assert_eq!(deleted(&service, &place(&study)).await, 204);
+    assert_eq!(delete(&service, &place(&study)).await, 204);
 }
 
 #[tokio::test]
 async fn rejects_study_over_limit() {
     let mut study = map(&shortest(), 10_000);
     study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 1001 });
-    let problem = begun(&Service::new(), &study).await.refused(422, "too_many_variants");
+    let problem = start_study(&Service::new(), &study).await.refused(422, "too_many_variants");
     assert!(problem["detail"].as_str().unwrap().contains("max_study_variants"), "{problem}");
     let error = &problem["errors"][0];
     assert_eq!(error["code"], "too_many_variants");
@@ -202,36 +202,36 @@ async fn rejects_study_over_limit() {
 }
 
 #[tokio::test]
-async fn four_studies_run_however_many_ask() {
+async fn at_most_four_studies_run() {
     let service = Service::within(ENDLESS);
     let studies: Vec<_> = (1..9).map(slow).collect();
-    let answers = join_all(studies.iter().map(|study| begun(&service, study))).await;
+    let answers = join_all(studies.iter().map(|study| start_study(&service, study))).await;
     let (running, refused): (Vec<_>, Vec<_>) = answers.iter().partition(|answer| answer.status == 202);
     assert_eq!(running.len(), 4);
     for answer in refused {
         answer.refused(503, "queue_full");
     }
     for study in running {
-        assert_eq!(deleted(&service, &place(&study.json())).await, 204);
+        assert_eq!(delete(&service, &place(&study.json())).await, 204);
     }
-    waited_for(&service, &map(&shortest(), 6)).await;
+    wait_for(&service, &map(&shortest(), 6)).await;
 }
 
-/// From seventeen islands on each piece was several of them, of which the first alone was looked at, and the study was done.
+/// With 17 or more islands each chunk holds several.
 #[tokio::test]
-async fn a_search_of_many_islands_looks_at_all_of_them() {
+async fn search_of_many_islands_evaluates_all() {
     let service = Service::within(LIMITS);
     let study = json!({
         "study": "search", "base": shortest(), "evaluations": 212_500, "free": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5 } },
         "objectives": [{ "quantity": "slot_wall_mm", "goal": "max" }, { "quantity": "outer_diameter_mm", "goal": "min" }]
     });
-    let found = waited_for(&service, &study).await;
+    let found = wait_for(&service, &study).await;
     assert_eq!((&found["state"], &found["looked_at"]), (&json!("done"), &json!(212_500)));
     assert_eq!((&found["result"]["is_complete"], &found["result"]["evaluated"]), (&json!(true), &json!(212_500)));
 }
 
 #[tokio::test]
-async fn what_cannot_be_is_said_at_the_field() {
+async fn invalid_study_is_refused_at_its_field() {
     let service = Service::new();
     let study = map(&shortest(), 5);
     for (document, pointer, code) in [
@@ -241,25 +241,25 @@ async fn what_cannot_be_is_said_at_the_field() {
         (with(&study, "/base/load", json!({})), "/base/load", "missing_field"),
         (with(&study, "/colour", json!(1)), "/colour", "unknown_field"),
     ] {
-        let (at, found, _) = begun(&service, &document).await.faulty_field();
+        let (at, found, _) = start_study(&service, &document).await.faulty_field();
         assert_eq!((at.as_str(), found.as_str()), (pointer, code));
     }
     let search = json!({
         "study": "search", "base": shortest(), "free": { "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0 } },
         "objectives": [{ "quantity": "transmission_ratio", "goal": "max" }]
     });
-    let (at, found, _) = begun(&service, &search).await.faulty_field();
+    let (at, found, _) = start_study(&service, &search).await.faulty_field();
     assert_eq!((at.as_str(), found.as_str()), ("/objectives/0/quantity", "unaffected"));
-    begun(&service, &json!("map")).await.refused(422, "invalid_document");
+    start_study(&service, &json!("map")).await.refused(422, "invalid_document");
     service.post_text("/v1/studies", "{").await.refused(400, "malformed_json");
 }
 
-/// A kind whose fields the search did not know was searched with nothing of it free, or refused as if something were missing.
+/// The kinds come from the API document, so a search cannot miss a kind's fields.
 #[tokio::test]
-async fn of_every_kind_of_wave_generator_and_tooth_in_the_api_document_all_lengths_are_free_in_a_search() {
+async fn search_frees_all_lengths_of_every_kind() {
     let service = Service::new();
     let schemas = &document()["components"]["schemas"];
-    // Not free are the counts, and grooves, which a ball need not have.
+    // Counts are not free, nor are grooves, which are optional.
     let apart = ["kind", "shape", "lobes", "count", "installed", "groove_radius_mm"];
     for (union, place) in [("WaveGenerator", "/drive/wave_generator"), ("Teeth", "/drive/teeth")] {
         let discriminator = &schemas[union]["discriminator"];
@@ -269,7 +269,7 @@ async fn of_every_kind_of_wave_generator_and_tooth_in_the_api_document_all_lengt
             let fields = schemas[name]["properties"].as_object().unwrap().keys();
             let lengths = fields.filter(|field| !apart.contains(&field.as_str()));
             let base = with(&json!({ "drive": {}, "load": { "output_torque_nm": 20.0 } }), place, json!({ tag: word }));
-            let found = waited_for(&service, &json!({
+            let found = wait_for(&service, &json!({
                 "study": "search", "evaluations": 200, "base": base,
                 "require": { "transmission_ratio": { "min": 19.5, "max": 20.5 }, "outer_diameter_mm": { "max": 120.0 } },
                 "objectives": [{ "quantity": "outer_diameter_mm", "goal": "min" }]
@@ -285,9 +285,9 @@ async fn of_every_kind_of_wave_generator_and_tooth_in_the_api_document_all_lengt
 }
 
 #[tokio::test]
-async fn a_map_is_a_table_too() {
+async fn map_is_available_as_table() {
     let service = Service::new();
-    let found = waited_for(&service, &map(&shortest(), 3)).await;
+    let found = wait_for(&service, &map(&shortest(), 3)).await;
     let question = Question::of("GET", found["result_href"].as_str().unwrap()).with("accept", "text/csv");
     let answer = service.ask(&question).await;
     assert_eq!(answer.status, 200);
@@ -302,13 +302,12 @@ async fn a_map_is_a_table_too() {
     assert!(answer.body.starts_with(b"PAR1") && answer.body.ends_with(b"PAR1"));
 }
 
-/// Each quantity of a document that every answer has, against the answer that holds it.
-/// How many quantities of a document were held against what their pointers lead to.
-async fn held_against_their_pointers(service: &Service, document: &Value) -> usize {
+/// Compares each quantity with the value at its pointer in the answers. Returns the number of compared quantities.
+async fn count_matching_pointers(service: &Service, document: &Value) -> usize {
     let listed = service.get("/v1/quantities").await.found();
     let listed = listed["quantities"].as_array().unwrap();
     let study = json!({ "study": "map", "base": with(document, "/sweep", json!({ "wind_up": true })), "over": { "/drive/teeth/radius_mm": { "one_of": [document["drive"]["teeth"]["radius_mm"]] } } });
-    let found = waited_for(service, &study).await;
+    let found = wait_for(service, &study).await;
     let mut compared = 0;
     for (name, values) in found["result"]["possible"]["quantities"].as_object().unwrap() {
         let quantity = listed.iter().find(|quantity| quantity["name"] == **name).unwrap();
@@ -329,31 +328,30 @@ fn rubbing() -> Value {
 }
 
 #[tokio::test]
-async fn every_quantity_is_what_its_pointer_leads_to() {
+async fn every_quantity_matches_value_at_its_pointer() {
     let service = Service::new();
     let mut compared = 0;
     let load = json!({ "input_torque_nm": 20.0, "input_speed_rpm": 1500.0, "allowable_stress_mpa": 1500.0 });
     let full = with(&with(&shortest(), "/load", load), "/friction", rubbing());
     for document in [full, undercut(), every_number()] {
-        compared += held_against_their_pointers(&service, &document).await;
+        compared += count_matching_pointers(&service, &document).await;
     }
     assert!(compared > 100, "{compared} compared");
 }
 
-/// They once were those of the hardest point alone, which is neither what the answer has nor what the drive loses.
 #[tokio::test]
-async fn under_a_duty_the_losses_of_a_variant_are_those_over_all_its_points() {
+async fn losses_under_duty_cover_all_points() {
     let duty = json!({ "duty": [
         { "input_torque_nm": 20.0, "input_speed_rpm": 500.0, "share_of_time": 0.25 },
         { "input_torque_nm": 2.0, "input_speed_rpm": 3000.0, "share_of_time": 0.75 },
     ] });
     let document = with(&with(&shortest(), "/load", duty), "/friction", rubbing());
-    let compared = held_against_their_pointers(&Service::new(), &document).await;
+    let compared = count_matching_pointers(&Service::new(), &document).await;
     assert!(compared > 40, "{compared} compared");
 }
 
 #[tokio::test]
-async fn every_quantity_ends_in_its_unit_and_says_what_it_means() {
+async fn every_quantity_names_unit_and_meaning() {
     let listed = Service::new().get("/v1/quantities").await.found();
     let listed = listed["quantities"].as_array().unwrap();
     for quantity in listed {

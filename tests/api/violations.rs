@@ -1,4 +1,4 @@
-//! Every reason why a drive, a load or a request cannot exist, as it comes over HTTP.
+//! Reasons for impossible drives, loads and requests, over HTTP.
 
 use serde_json::{Value, json};
 
@@ -15,7 +15,7 @@ async fn errors_of(service: &Service, path: &str, document: &Value) -> Vec<Value
     problem["errors"].as_array().unwrap().clone()
 }
 
-/// That a change of case 5.1 makes one value impossible, to every endpoint.
+/// Asserts that every endpoint refuses a change of case 5.1 at one value.
 async fn assert_impossible(changes: &[(&str, Value)], code: &str, pointer: &str, value: f64, limit: f64) {
     let document =
         changes.iter().fold(spelled_out(), |document, (pointer, value)| with(&document, pointer, value.clone()));
@@ -40,20 +40,20 @@ const RING_TEETH: &str = "/drive/ring/teeth";
 const TIP_RADIUS: &str = "/drive/ring/tip_radius_mm";
 
 #[tokio::test]
-async fn a_length_of_nothing_is_out_of_range() {
+async fn zero_length_is_out_of_range() {
     assert_impossible(&[(WIDTH, json!(0))], "out_of_range", WIDTH, 0.0, 1e-6).await;
     assert_impossible(&[(RADIUS, json!(-5.0))], "out_of_range", RADIUS, -5.0, 1e-6).await;
     assert_impossible(&[(TIP_RADIUS, json!(2e6))], "out_of_range", TIP_RADIUS, 2e6, 1e6).await;
 }
 
 #[tokio::test]
-async fn a_cam_is_elongated() {
+async fn cam_must_be_elongated() {
     assert_impossible(&[(SEMI_MINOR, json!(58.0))], "cam_not_elongated", SEMI_MAJOR, 58.0, 58.0).await;
     assert_impossible(&[(SEMI_MINOR, json!(58.5))], "cam_not_elongated", SEMI_MAJOR, 58.0, 58.5).await;
 }
 
 #[tokio::test]
-async fn ring_and_carrier_differ_by_two_teeth() {
+async fn ring_and_carrier_must_differ_by_two_teeth() {
     for (teeth, nearest) in [(28, 26), (27, 26), (25, 26), (29, 30), (31, 30), (100, 30), (2, 26)] {
         let expected = (f64::from(teeth), f64::from(nearest));
         assert_impossible(&[(RING_TEETH, json!(teeth))], "tooth_difference", RING_TEETH, expected.0, expected.1).await;
@@ -61,7 +61,7 @@ async fn ring_and_carrier_differ_by_two_teeth() {
 }
 
 #[tokio::test]
-async fn a_ring_beside_the_least_and_the_most_teeth_has_the_number_that_is_in_range() {
+async fn proposed_ring_teeth_are_within_range() {
     for (count, ring, nearest) in [(2, 2, 4.0), (10_000, 10_000, 9_998.0)] {
         let changes = [(COUNT, json!(count)), (INSTALLED, json!(2)), (RING_TEETH, json!(ring)), (RADIUS, json!(4.9))];
         let value = f64::from(ring);
@@ -70,7 +70,7 @@ async fn a_ring_beside_the_least_and_the_most_teeth_has_the_number_that_is_in_ra
 }
 
 #[tokio::test]
-async fn teeth_may_be_odd_and_need_not_be_alike_in_all_zones() {
+async fn teeth_may_be_odd_and_zones_unlike() {
     let odd = with(&with(&spelled_out(), COUNT, json!(27)), RING_TEETH, json!(25));
     for document in
         [without(&odd, INSTALLED), with(&odd, INSTALLED, json!(27)), with(&spelled_out(), INSTALLED, json!(7))]
@@ -82,7 +82,7 @@ async fn teeth_may_be_odd_and_need_not_be_alike_in_all_zones() {
 }
 
 #[tokio::test]
-async fn an_eccentric_circle_holds_the_axis() {
+async fn eccentric_circle_must_contain_axis() {
     for (radius, eccentricity) in [(1.2, 1.2), (1.0, 1.2)] {
         let document = with(&eccentric(), "/drive/wave_generator/radius_mm", json!(radius));
         for path in ENDPOINTS {
@@ -95,14 +95,14 @@ async fn an_eccentric_circle_holds_the_axis() {
 }
 
 #[tokio::test]
-async fn a_flat_is_shorter_than_its_tooth_is_thick() {
+async fn flat_must_be_shorter_than_tooth_thickness() {
     let flats =
         json!({ "shape": "flat_sided", "count": 28, "radius_mm": 5.0, "width_mm": 15.0, "flat_length_mm": 10.0 });
     assert_impossible(&[("/drive/teeth", flats)], "flat_too_long", "/drive/teeth/flat_length_mm", 10.0, 10.0).await;
 }
 
 #[tokio::test]
-async fn a_groove_is_wider_than_its_ball() {
+async fn groove_must_be_wider_than_ball() {
     let balls =
         json!({ "shape": "ball", "count": 28, "radius_mm": 5.0, "groove_radius_mm": { "carrier": 5.0, "ring": 5.2 } });
     let document = with(&with(&spelled_out(), "/drive/teeth", balls), "/model", json!({}));
@@ -115,7 +115,7 @@ async fn a_groove_is_wider_than_its_ball() {
 }
 
 #[tokio::test]
-async fn no_fault_is_reported_at_a_field_that_is_left_out() {
+async fn reports_no_fault_at_omitted_field() {
     for (count, ring) in [(20_000, 19_998), (1, 3), (-4, -2)] {
         let document = with(&with(&spelled_out(), COUNT, json!(count)), RING_TEETH, json!(ring));
         for path in ENDPOINTS {
@@ -127,7 +127,7 @@ async fn no_fault_is_reported_at_a_field_that_is_left_out() {
 }
 
 #[tokio::test]
-async fn installed_teeth_divide_the_theoretical_ones() {
+async fn installed_teeth_must_divide_theoretical_ones() {
     for (installed, nearest) in [(8, 7.0), (9, 7.0), (10, 7.0), (56, 28.0)] {
         let value = f64::from(installed);
         let changes = [(INSTALLED, json!(installed)), (RADIUS, json!(3.0))];
@@ -138,7 +138,7 @@ async fn installed_teeth_divide_the_theoretical_ones() {
 }
 
 #[tokio::test]
-async fn neighbouring_teeth_do_not_touch() {
+async fn neighbouring_teeth_must_not_touch() {
     // The cam is next to round: teeth touch where (56 mm + r) sin(π/28) = r.
     let sin = (std::f64::consts::PI / 28.0).sin();
     let largest = 56.0 * sin / (1.0 - sin);
@@ -153,26 +153,26 @@ async fn neighbouring_teeth_do_not_touch() {
 }
 
 #[tokio::test]
-async fn an_annulus_is_left_for_the_carrier() {
+async fn carrier_needs_an_annulus() {
     // The tips stand at b + 2r = 57.8 mm, inside the cam's 58.
     assert_impossible(&[(RADIUS, json!(0.9))], "no_carrier_annulus", SEMI_MAJOR, 58.0, 57.8).await;
     assert_impossible(&[(RADIUS, json!(1.0))], "no_carrier_annulus", SEMI_MAJOR, 58.0, 58.0).await;
 }
 
 #[tokio::test]
-async fn a_bore_may_make_room_for_the_carrier() {
+async fn bore_may_make_room_for_carrier() {
     let document = with(&with(&spelled_out(), RADIUS, json!(0.9)), TIP_RADIUS, json!(58.5));
     assert_eq!(Service::new().post("/v1/geometry", &document).await.status, 200);
 }
 
 #[tokio::test]
-async fn a_bore_leaves_a_flank() {
+async fn bore_must_leave_a_flank() {
     assert_impossible(&[(TIP_RADIUS, json!(68.0))], "bore_leaves_no_flank", TIP_RADIUS, 68.0, 68.0).await;
     assert_impossible(&[(TIP_RADIUS, json!(70.0))], "bore_leaves_no_flank", TIP_RADIUS, 70.0, 68.0).await;
 }
 
 #[tokio::test]
-async fn every_impossible_value_is_reported_at_once_with_value_and_limit() {
+async fn reports_every_impossible_value_with_value_and_limit() {
     let mut document = every_number();
     let mut expected = Vec::new();
     for (pointer, value, limit) in [
@@ -215,7 +215,7 @@ async fn every_impossible_value_is_reported_at_once_with_value_and_limit() {
 }
 
 #[tokio::test]
-async fn values_that_do_not_fit_each_other_are_reported_at_once_and_beside_values_out_of_range() {
+async fn reports_contradictions_beside_values_out_of_range() {
     let document = [
         (SEMI_MINOR, json!(58.0)),
         (INSTALLED, json!(9)),
@@ -235,7 +235,7 @@ async fn values_that_do_not_fit_each_other_are_reported_at_once_and_beside_value
     assert_eq!(errors.len(), 8, "{errors:?}");
 }
 
-/// A fault of case 5.1: the changes that make it, what it is reported as, and what else it follows from.
+/// A fault of case 5.1, with the changes that cause it, its report, and the fields on which it depends.
 struct SingleFault {
     changes: &'static [(&'static str, f64)],
     code: &'static str,
@@ -276,7 +276,7 @@ const BORE: &str = "/parts/wave_generator/bore_radius_mm";
 const CAM_CLEARANCE: &str = "/parts/wave_generator/clearance_um";
 const TEETH_CLEARANCE: &str = "/parts/teeth/clearance_um";
 
-/// Every fault that the drive alone can have, by the least that it follows from.
+/// All faults of a drive, each with the fewest fields on which it depends.
 const FAULTS_OF_DRIVE: [SingleFault; 14] = [
     single(&[(SEMI_MAJOR, 2e6)], "out_of_range", SEMI_MAJOR, &[]),
     single(&[(SEMI_MINOR, -1.0)], "out_of_range", SEMI_MINOR, &[]),
@@ -349,7 +349,7 @@ const FAULTS_OF_DRAWING: [SingleFault; 18] = [
 ];
 
 #[tokio::test]
-async fn no_fault_hides_another_that_follows_from_other_fields() {
+async fn no_fault_hides_fault_of_other_fields() {
     let service = Service::new();
     let base = with(&spelled_out(), "/model/stiffness", fixed(4e5, 5e5, 3e5));
     let empty_parts = json!({ "ring": {}, "carrier": {}, "teeth": {}, "wave_generator": {} });
@@ -389,7 +389,7 @@ async fn no_fault_hides_another_that_follows_from_other_fields() {
 }
 
 #[tokio::test]
-async fn what_only_geometry_can_tell_is_reported_beside_values_out_of_range() {
+async fn reports_geometry_faults_beside_values_out_of_range() {
     // Thick teeth on a small cam touch; a deep ellipse leaves no annulus.
     let document = json!({
         "drive": {
@@ -409,7 +409,7 @@ async fn what_only_geometry_can_tell_is_reported_beside_values_out_of_range() {
 }
 
 #[tokio::test]
-async fn touching_teeth_and_a_missing_annulus_are_reported_together() {
+async fn reports_touching_teeth_and_missing_annulus_together() {
     let document = json!({
         "drive": {
             "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 2.0 },
@@ -421,7 +421,7 @@ async fn touching_teeth_and_a_missing_annulus_are_reported_together() {
 }
 
 #[tokio::test]
-async fn a_detail_names_the_field_where_there_is_one_and_counts_them_where_there_are_several() {
+async fn detail_names_one_field_or_counts_several() {
     let one = with(&spelled_out(), RADIUS, json!(0.0));
     let problem = Service::new().post("/v1/sweep", &one).await.refused(422, "impossible_design");
     assert!(problem["detail"].as_str().unwrap().contains(RADIUS), "{problem}");
@@ -431,7 +431,7 @@ async fn a_detail_names_the_field_where_there_is_one_and_counts_them_where_there
 }
 
 #[tokio::test]
-async fn a_sweep_without_a_lever_arm_at_every_input_angle_has_no_tooth_in_mesh() {
+async fn sweep_needs_lever_arm_at_every_angle() {
     let service = Service::new();
     // ψ_e = 90° and exactly one spacing of four teeth: at j = 0 the only tooth stands on the minor axis.
     let four = with(&spelled_out(), INSTALLED, json!(4));
@@ -460,8 +460,8 @@ async fn a_sweep_without_a_lever_arm_at_every_input_angle_has_no_tooth_in_mesh()
     }
 }
 
-/// A ring with more teeth than the carrier, soft at the slots: the projection of their approach turns against the rest.
-fn softly_held(compatibility: &str, carrier_n_per_mm: f64) -> Value {
+/// Returns a drive with more ring teeth and soft slots: projecting their approach gives a negative compliance.
+fn soft_slots(compatibility: &str, carrier_n_per_mm: f64) -> Value {
     json!({
         "drive": {
             "wave_generator": { "semi_major_mm": 40.6, "semi_minor_mm": 39.4 },
@@ -474,17 +474,17 @@ fn softly_held(compatibility: &str, carrier_n_per_mm: f64) -> Value {
 }
 
 #[tokio::test]
-async fn a_projection_whose_stiffnesses_leave_a_tooth_no_compliance_is_refused_and_virtual_work_is_not() {
+async fn tooth_without_compliance_is_refused_under_projection_only() {
     let service = Service::new();
     let problem =
-        service.post("/v1/sweep", &softly_held("projection", 1e3)).await.refused(422, "compliance_not_positive");
+        service.post("/v1/sweep", &soft_slots("projection", 1e3)).await.refused(422, "compliance_not_positive");
     assert!(problem["detail"].as_str().unwrap().contains("virtual_work"), "{problem}");
-    service.post("/v1/sweep", &softly_held("virtual_work", 1e3)).await.found();
-    service.post("/v1/sweep", &softly_held("projection", 1e9)).await.found();
+    service.post("/v1/sweep", &soft_slots("virtual_work", 1e3)).await.found();
+    service.post("/v1/sweep", &soft_slots("projection", 1e9)).await.found();
 }
 
 #[tokio::test]
-async fn the_carrier_may_have_more_teeth_or_fewer_than_the_ring() {
+async fn carrier_may_have_more_teeth_or_fewer() {
     for (ring, ratio, other) in [(26, 14.0, -13.0), (30, -14.0, 15.0)] {
         let document = with(&spelled_out(), RING_TEETH, json!(ring));
         let found = Service::new().post("/v1/geometry", &document).await.found();
@@ -496,7 +496,7 @@ async fn the_carrier_may_have_more_teeth_or_fewer_than_the_ring() {
 }
 
 #[tokio::test]
-async fn a_sweep_larger_than_max_states_is_refused_with_value_and_limit_and_one_as_large_is_not() {
+async fn sweep_over_max_states_is_refused() {
     // 7 teeth at each of 51 input angles.
     let service = Service::within(Limits { max_states: 357, ..LIMITS });
     service.post("/v1/sweep", &spelled_out()).await.found();
@@ -510,7 +510,7 @@ async fn a_sweep_larger_than_max_states_is_refused_with_value_and_limit_and_one_
 }
 
 #[tokio::test]
-async fn states_are_counted_as_they_are_swept() {
+async fn counted_states_equal_swept_states() {
     for document in [undercut(), crate::designs::bored()] {
         for samples in [1, 2, 7, 50, 51] {
             let document = with(&document, "/sweep", json!({ "samples": samples }));
@@ -525,7 +525,7 @@ async fn states_are_counted_as_they_are_swept() {
 }
 
 #[tokio::test]
-async fn profiles_larger_than_max_profile_points_are_refused_with_value_and_limit_and_as_large_ones_are_not() {
+async fn profiles_over_max_profile_points_are_refused() {
     for extent in ["tooth", "full"] {
         let document = with(&spelled_out(), "/profile/extent", json!(extent));
         let found = Service::new().post("/v1/geometry", &document).await.found();
@@ -546,13 +546,13 @@ async fn profiles_larger_than_max_profile_points_are_refused_with_value_and_limi
             (Some(points as f64), Some((points - 1) as f64))
         );
         let detail = problem["detail"].as_str().unwrap();
-        assert!(detail.ends_with("widen the chord tolerance"), "{detail}");
+        assert!(detail.ends_with("Use a larger chord tolerance"), "{detail}");
         assert!(detail.contains(&points.to_string()) && detail.contains(&(points - 1).to_string()), "{detail}");
     }
 }
 
 #[tokio::test]
-async fn a_refusal_for_a_limit_names_the_limit_as_it_can_be_read() {
+async fn limit_refusal_names_limit_as_published() {
     let service = Service::within(Limits { max_states: 1, max_body_bytes: 2_000, ..LIMITS });
     let limits = service.get("/v1/limits").await.found();
     let long = format!("{}{}", spelled_out(), " ".repeat(2_000));
@@ -568,7 +568,7 @@ async fn a_refusal_for_a_limit_names_the_limit_as_it_can_be_read() {
 }
 
 #[tokio::test]
-async fn every_kind_of_fault_of_a_field_can_be_met_over_http() {
+async fn every_field_fault_occurs_over_http() {
     let document = spelled_out();
     let huge = with(&document, RADIUS, json!("HERE")).to_string().replace("\"HERE\"", "1e999");
     let texts = [
@@ -620,7 +620,7 @@ async fn every_kind_of_fault_of_a_field_can_be_met_over_http() {
     let modified = with(&document, "/modification", json!({ "slot_wall_um": -6000.0 }));
     errors.extend(errors_at("/v1/drawings/assembly", &modified).await);
     let mut codes = words(&field_codes());
-    // Those of studies, met among the studies.
+    // Faults of studies are covered by the tests of studies.
     codes.retain(|code| !["too_many_variants", "unaffected"].contains(&code.as_str()));
     assert_eq!(codes_of(&errors), codes);
 }

@@ -1,4 +1,4 @@
-//! Quantities that two fields can set: a contradiction is refused, what adds up gets a finding.
+//! Quantities that two fields can set. A contradiction is refused, and values that add up give a finding.
 
 use serde_json::{Value, json};
 use toothwave_calculation::convert::converted;
@@ -13,14 +13,14 @@ use toothwave_solver::Never;
 
 const LIMITS: Limits = Limits::new(1_000_000, 1_000_000);
 
-/// The default model.
+/// Returns case 5.2 under the default model.
 fn case_5_2() -> Value {
     let mut document: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
     document.as_object_mut().unwrap().remove("model");
     document
 }
 
-/// Case 5.2 with these fields.
+/// Returns case 5.2 with these fields.
 fn with(changes: &Value) -> Value {
     let mut document = case_5_2();
     for (name, value) in changes.as_object().unwrap() {
@@ -44,7 +44,7 @@ fn codes(answer: &Value) -> Vec<(String, Value)> {
 }
 
 #[test]
-fn a_contradiction_is_refused_at_one_of_its_fields() {
+fn contradiction_is_refused_at_one_field() {
     let duty = json!([{ "input_torque_nm": 3.0, "input_speed_rpm": 1500.0, "share_of_time": 1.0 }]);
     let pairs = [
         (json!({ "load": { "input_torque_nm": 3.0, "output_torque_nm": 126.0 } }), "/load"),
@@ -83,7 +83,7 @@ fn a_contradiction_is_refused_at_one_of_its_fields() {
 }
 
 #[test]
-fn projection_takes_no_listed_refinement() {
+fn projection_rejects_listed_refinement() {
     let refused =
         swept(&json!({ "model": { "compatibility": "projection", "refinements": ["ring_teeth_bend"] } })).unwrap_err();
     assert_eq!(
@@ -93,12 +93,12 @@ fn projection_takes_no_listed_refinement() {
 }
 
 #[test]
-fn a_gap_is_the_sum_of_two_clearances() {
+fn gap_is_sum_of_two_clearances() {
     let without_n = largest_n(&json!({}));
     let of_ring = json!({ "parts": { "ring": { "clearance_um": 10.0 } } });
     let gap_n = largest_n(&of_ring);
     assert!((without_n - 450.7).abs() < 0.05 && (gap_n - 709.9).abs() < 0.05, "{without_n} and {gap_n}");
-    // Of all contacts alike: each part a half, or the teeth all of it.
+    // A clearance of all contacts gives each part one half, or the teeth all of it.
     let halves =
         ["wave_generator", "ring", "carrier", "teeth"].map(|part| (part.to_owned(), json!({ "clearance_um": 5.0 })));
     let halves = json!({ "parts": halves.into_iter().collect::<serde_json::Map<_, _>>() });
@@ -107,7 +107,7 @@ fn a_gap_is_the_sum_of_two_clearances() {
 }
 
 #[test]
-fn clearances_of_all_parts_load_an_eccentric_drive() {
+fn clearances_of_all_parts_load_eccentric_drive() {
     let document: Value = serde_json::from_str(
         r#"{"drive":{"wave_generator":{"kind":"eccentric","radius_mm":30.8,"eccentricity_mm":1.2},
             "teeth":{"shape":"cylinder","count":17,"radius_mm":3,"width_mm":6},"ring":{"teeth":18}},"load":{"input_torque_nm":2}}"#,
@@ -126,7 +126,7 @@ fn clearances_of_all_parts_load_an_eccentric_drive() {
 }
 
 #[test]
-fn a_deprecated_clearance_means_the_same_in_parts() {
+fn deprecated_clearance_means_the_same_in_parts() {
     let old = json!({ "model": { "clearance": { "ring_um": 10.0 } } });
     let new = json!({ "parts": { "ring": { "clearance_um": 10.0 } } });
     assert_eq!(largest_n(&old).to_bits(), largest_n(&new).to_bits());
@@ -141,13 +141,13 @@ fn a_deprecated_clearance_means_the_same_in_parts() {
     };
     assert_eq!(drawn(&old)["bodies"], drawn(&new)["bodies"]);
     assert!(codes(&drawn(&old)).iter().any(|(code, _)| code == "deprecated_field"));
-    // What both say is no contradiction.
+    // Equal values are no contradiction.
     let both = json!({ "model": old["model"], "parts": new["parts"] });
     assert_eq!(largest_n(&both).to_bits(), largest_n(&new).to_bits());
 }
 
 #[test]
-fn a_deprecated_switch_overrides_its_own_refinement() {
+fn deprecated_switch_overrides_its_own_refinement() {
     let refinements = |model: Value| {
         swept(&json!({ "model": model, "parts": { "ring": { "clearance_um": 10.0 } } })).unwrap()["model"]["refinements"].clone()
     };
@@ -161,7 +161,7 @@ fn a_deprecated_switch_overrides_its_own_refinement() {
 }
 
 #[test]
-fn a_surface_set_back_twice_has_a_finding() {
+fn surface_set_back_twice_has_finding() {
     for (part, modified) in [
         ("wave_generator", "wave_generator_equidistant_um"),
         ("teeth", "tooth_radius_um"),
@@ -175,7 +175,7 @@ fn a_surface_set_back_twice_has_a_finding() {
     }
 }
 
-/// With all numbers as doubles.
+/// Converts all numbers to doubles.
 fn plain(value: &Value) -> Value {
     match value {
         Value::Number(number) => json!(number.as_f64()),
@@ -190,7 +190,7 @@ fn convert(document: &Value) -> Value {
 }
 
 #[test]
-fn a_converted_document_gives_the_same_forces_undeprecated() {
+fn converted_document_gives_same_forces_undeprecated() {
     let models = [
         json!({ "clearance": { "ring_um": 10.0, "carrier_um": 2.0 } }),
         json!({ "ring_teeth_bend": true, "clearance": { "wave_generator_um": 3.0 } }),
@@ -209,13 +209,13 @@ fn a_converted_document_gives_the_same_forces_undeprecated() {
 }
 
 #[test]
-fn a_document_without_deprecated_fields_stays_as_it_is() {
+fn document_without_deprecated_fields_stays_unchanged() {
     let document = with(&json!({ "model": { "refinements": "none" }, "parts": { "ring": { "clearance_um": 1.5 } } }));
     assert_eq!(convert(&document), plain(&document));
 }
 
 #[test]
-fn a_study_is_converted_with_its_pointers() {
+fn study_is_converted_with_its_pointers() {
     let old = json!({
         "study": "map", "base": with(&json!({ "model": { "clearance": { "carrier_um": 2.0 } } })),
         "over": { "/model/clearance/ring_um": { "min": 0.0, "max": 10.0, "steps": 3 } }

@@ -1,4 +1,4 @@
-//! A default that is written out means what it means where it is left out.
+//! A default means the same whether it is written out or left out.
 
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -31,7 +31,7 @@ fn examples() -> Vec<Value> {
     EXAMPLES.iter().map(|text| serde_json::from_str(text).unwrap()).collect()
 }
 
-/// Puts a value at a place, in objects that are made where there are none.
+/// Sets a value and creates missing parent objects.
 fn put(document: &mut Value, pointer: &str, value: Value) {
     let mut at = document;
     for name in pointer.split('/').skip(1) {
@@ -43,7 +43,7 @@ fn put(document: &mut Value, pointer: &str, value: Value) {
     *at = value;
 }
 
-/// Every default that a document leaves out: those that a written document has, and those that follow from other fields.
+/// Lists every omitted default: fixed ones, and those that follow from other fields.
 fn defaults(document: &Value) -> Vec<(String, Value)> {
     let design = read(document).unwrap();
     let mut written = serde_json::to_value(&design).unwrap();
@@ -62,7 +62,7 @@ fn defaults(document: &Value) -> Vec<(String, Value)> {
     found.map(|pointer| (pointer.clone(), written.pointer(&pointer).unwrap().clone())).collect()
 }
 
-/// The document with one default more, and what has to stand beside it: a law's name beside its numbers.
+/// Returns the document with one more default and its required companions, such as a law's name with its numbers.
 fn with_default(document: &Value, (pointer, value): &(String, Value)) -> Value {
     let mut document = document.clone();
     if pointer.starts_with("/model/stiffness/depth_mm") {
@@ -84,13 +84,13 @@ fn assert_defaults_change_no_key(document: &Value) {
 }
 
 #[test]
-fn defaults_of_examples_written_out_change_no_key() {
+fn explicit_defaults_of_examples_keep_every_key() {
     examples().iter().for_each(assert_defaults_change_no_key);
 }
 
 proptest! {
     #[test]
-    fn defaults_of_any_document_written_out_change_no_key(seed: u64) {
+    fn explicit_defaults_of_any_document_keep_key(seed: u64) {
         assert_defaults_change_no_key(&Schemas::new().document(&mut Chance::new(seed)));
     }
 }
@@ -102,14 +102,14 @@ fn answer(document: &Value) -> Value {
     serde_json::to_value(answer).unwrap()
 }
 
-/// Case 5.2, whose tips are pointed.
+/// Returns case 5.2, whose tips are pointed.
 fn pointed() -> Value {
     let mut document = examples().swap_remove(7);
     document["model"] = json!({});
     document
 }
 
-/// Documents whose refinements are left to the geometry, in all of its cases.
+/// Returns documents whose refinements follow from the geometry, in all cases.
 fn refined() -> Vec<Value> {
     let with = |pointer: &str, value: Value| {
         let mut document = pointed();
@@ -130,7 +130,7 @@ fn refined() -> Vec<Value> {
 }
 
 #[test]
-fn the_model_sent_back_gives_the_same_answer() {
+fn returned_model_gives_same_answer() {
     for document in refined() {
         let first = answer(&document);
         let mut sent_back = document.clone();
@@ -145,7 +145,7 @@ fn the_model_sent_back_gives_the_same_answer() {
 }
 
 #[test]
-fn naming_the_default_law_changes_no_force() {
+fn naming_default_law_changes_no_force() {
     let largest_n =
         |document: &Value| answer(document)["peaks"]["wave_generator"]["force_n"]["value"].as_f64().unwrap();
     let mut document = pointed();

@@ -1,4 +1,4 @@
-//! A document as JSON, and as the key of its answers.
+//! Design documents as JSON, and their cache keys.
 
 use std::cell::Cell;
 
@@ -26,9 +26,9 @@ pub(crate) fn read(document: &Value) -> Result<Design, NoAnswer> {
     Design::read(document.to_string().as_bytes())
 }
 
-/// What is short is solved on the threads that everything else waits for: case 5.1 with nothing that takes longer.
+/// Short sweeps are solved on the threads that serve requests.
 #[test]
-fn a_short_sweep_is_not_short_where_the_rings_teeth_bend() {
+fn short_sweep_has_no_bending_ring_teeth() {
     let mut document = json!({
         "drive": {
             "wave_generator": { "semi_major_mm": 58, "semi_minor_mm": 56 },
@@ -50,7 +50,7 @@ fn a_short_sweep_is_not_short_where_the_rings_teeth_bend() {
     assert!(is_short(&document), "natural tips have no corner");
 }
 
-/// Asked so often whether to go on, and then it is not to.
+/// A stop flag that is set after so many reads.
 struct StopsAfter {
     asked: Cell<u32>,
     times: u32,
@@ -64,7 +64,7 @@ impl Stop for StopsAfter {
 }
 
 #[test]
-fn a_sweep_is_stopped_behind_its_solve_too() {
+fn sweep_stops_after_its_solve_too() {
     let document = json!({
         "drive": {
             "wave_generator": { "semi_major_mm": 58, "semi_minor_mm": 56 },
@@ -87,7 +87,7 @@ fn a_sweep_is_stopped_behind_its_solve_too() {
     }
 }
 
-/// The keys of all questions, one after the other.
+/// Concatenates the keys of all questions.
 pub(crate) fn keys(design: &Design) -> Vec<Key> {
     let form = Format::Json;
     let mut keys = vec![
@@ -106,13 +106,13 @@ fn with(document: &Value, pointer: &str, value: Value) -> Value {
     document
 }
 
-/// Another value of the same type, where there is one that is read as another.
+/// Returns another value of the same type, if one reads differently.
 fn other(value: &Value) -> Option<Value> {
     match value {
         Value::Number(number) => {
             let number = number.as_f64().unwrap();
             let other = if number.fract() == 0.0 { number + 1.0 } else { number * 0.75 };
-            // Beyond 2^53 a number is the next one too.
+            // Above 2^53, adding one gives the same double.
             (other.total_cmp(&number).is_ne()).then(|| json!(other))
         }
         Value::Bool(value) => Some(json!(!value)),
@@ -120,7 +120,7 @@ fn other(value: &Value) -> Option<Value> {
     }
 }
 
-/// That a document is refused for one fault, at this place.
+/// Asserts that a document is refused for one fault at this place.
 fn assert_fault(document: &Value, pointer: &str, code: FieldCode) {
     let refused = read(document).unwrap_err();
     assert_eq!(refused.code, NoAnswerCode::InvalidDocument, "{document}");
@@ -130,16 +130,16 @@ fn assert_fault(document: &Value, pointer: &str, code: FieldCode) {
 
 proptest! {
     #[test]
-    fn a_document_that_is_written_as_json_reads_back_as_itself(seed: u64) {
+    fn document_survives_json_round_trip(seed: u64) {
         let document = Schemas::new().document(&mut Chance::new(seed));
         let design = read(&document).unwrap_or_else(|refused| panic!("{refused}: {document}"));
         let written = serde_json::to_string(&design).unwrap();
         prop_assert_eq!(Design::read(written.as_bytes()), Ok(design), "{}", written);
     }
 
-    /// Questions ask for parts of a document; together they ask for all of it.
+    /// Each question reads a part of the document. Together they read all of it.
     #[test]
-    fn each_number_that_is_changed_gives_some_question_another_key(seed: u64) {
+    fn each_changed_number_changes_a_key(seed: u64) {
         let document = Schemas::new().document(&mut Chance::new(seed));
         let before = keys(&read(&document).unwrap());
         for pointer in leaves(&document, "") {
@@ -151,16 +151,16 @@ proptest! {
     }
 
     #[test]
-    fn another_document_has_another_key(one: u64, other: u64) {
+    fn different_documents_have_different_keys(one: u64, other: u64) {
         let document = |seed| read(&Schemas::new().document(&mut Chance::new(seed))).unwrap();
         let (one, other) = (document(one), document(other));
         prop_assert_eq!(one == other, keys(&one) == keys(&other));
     }
 
     #[test]
-    fn a_structural_fault_is_told_at_its_place_in_every_kind_of_object(seed: u64) {
+    fn structural_fault_is_reported_at_its_place(seed: u64) {
         let document = Schemas::new().document(&mut Chance::new(seed));
-        // No refinement is a list of none.
+        // An empty list means no refinement.
         for pointer in leaves(&document, "").into_iter().filter(|pointer| pointer != "/model/refinements") {
             assert_fault(&with(&document, &pointer, json!([])), &pointer, FieldCode::WrongType);
         }
@@ -182,7 +182,7 @@ fn short() -> Value {
 }
 
 #[test]
-fn the_word_of_a_kind_is_told_apart_from_the_fields_of_that_kind() {
+fn reports_fault_of_kind_apart_from_its_fields() {
     let fault = |wave_generator: Value, pointer: &str, code| {
         assert_fault(
             &with(&short(), "/drive/wave_generator", wave_generator),
@@ -206,20 +206,20 @@ fn the_word_of_a_kind_is_told_apart_from_the_fields_of_that_kind() {
 }
 
 #[test]
-fn the_word_of_a_kind_may_stand_behind_its_fields() {
+fn word_of_kind_may_follow_its_fields() {
     let behind = short().to_string().replace(r#""semi_minor_mm":56.0"#, r#""semi_minor_mm":56.0,"kind":"ellipse""#);
     assert_eq!(Design::read(behind.as_bytes()), read(&short()));
 }
 
 #[test]
-fn a_word_is_no_object() {
+fn object_in_place_of_word_is_refused() {
     let mut document = short();
     document["model"] = json!({ "compatibility": {} });
     assert_fault(&document, "/model/compatibility", FieldCode::WrongType);
 }
 
 #[test]
-fn whole_numbers_are_written_without_a_point_as_far_as_they_are_told_apart() {
+fn whole_numbers_are_written_without_point() {
     let written = |teeth: Value| {
         let design = read(&with(&short(), "/drive/ring/teeth", teeth)).unwrap();
         serde_json::to_value(design).unwrap()["drive"]["ring"]["teeth"].to_string()
@@ -228,7 +228,7 @@ fn whole_numbers_are_written_without_a_point_as_far_as_they_are_told_apart() {
 }
 
 #[test]
-fn what_is_left_out_has_the_key_of_its_default() {
+fn omitted_value_has_key_of_its_default() {
     let short = short();
     let mut long = short.clone();
     long["drive"]["wave_generator"]["kind"] = json!("ellipse");
@@ -249,7 +249,7 @@ fn what_is_left_out_has_the_key_of_its_default() {
 }
 
 #[test]
-fn each_number_of_the_modification_reaches_the_solver_as_itself() {
+fn each_modification_reaches_the_solver() {
     let mut document = short();
     document["model"] = json!({ "compatibility": "virtual_work" });
     document["modification"] = json!({
@@ -272,7 +272,7 @@ fn each_number_of_the_modification_reaches_the_solver_as_itself() {
 }
 
 #[test]
-fn each_number_of_the_deviations_reaches_the_solver_as_itself() {
+fn each_deviation_reaches_the_solver() {
     let mut document = short();
     document["deviations"] = json!({
         "tooth_radius_um": [1.0, 2.0], "slot_angle_arcsec": [3.0], "slot_wall_um": [4.0], "ring_space_um": [5.0],
@@ -292,6 +292,6 @@ fn each_number_of_the_deviations_reaches_the_solver_as_itself() {
     };
     let design = read(&document).unwrap();
     assert_eq!(Deviations::from(&design.deviations), expected);
-    // What was written reads back as itself.
+    // A written document reads back as itself.
     assert_eq!(read(&serde_json::to_value(&design).unwrap()).unwrap(), design);
 }

@@ -1,4 +1,4 @@
-//! Losses of a sweep to a tolerance.
+//! Losses of a tolerance sweep.
 
 use serde_json::{Value, json};
 use toothwave_calculation::question::{Limits, Question};
@@ -14,7 +14,7 @@ fn loss_ratio(document: &Value, sweep: Value) -> f64 {
     answer.losses.unwrap().totals.loss_ratio
 }
 
-/// Corners of tips, gaps, and teeth that begin to roll elsewhere within a period.
+/// Returns a document with corner contact, gaps, and teeth that change their rolling contact within a period.
 fn document() -> Value {
     json!({
         "drive": {
@@ -34,7 +34,7 @@ fn document() -> Value {
 }
 
 #[test]
-fn a_loss_keeps_the_tolerance_of_its_sweep() {
+fn losses_keep_tolerance_of_sweep() {
     let finest = loss_ratio(&document(), json!({ "tolerance": 1e-10 }));
     let equal = loss_ratio(&document(), json!({ "samples": 64_000 }));
     assert!((finest / equal - 1.0).abs() < 1e-7, "{finest} and {equal}");
@@ -45,7 +45,7 @@ fn a_loss_keeps_the_tolerance_of_its_sweep() {
 }
 
 #[test]
-fn a_loss_does_not_depend_on_wind_up() {
+fn losses_do_not_depend_on_wind_up() {
     let tolerance = 1e-2;
     let alone = loss_ratio(&document(), json!({ "tolerance": tolerance }));
     let besides = loss_ratio(&document(), json!({ "tolerance": tolerance, "wind_up": true }));

@@ -1,4 +1,4 @@
-//! What is true of documents and of what tells them apart.
+//! Tests of design documents and their answers.
 #![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 mod contradictions;

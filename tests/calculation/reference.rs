@@ -1,4 +1,5 @@
-//! Whole documents of every kind against `tests/reference/family.py`, which works them out to 25 digits by other means; worst: 4.6e-15 of a column's peak.
+//! Documents of every kind against `tests/reference/family.py`, an independent calculation to 25 digits.
+//! The worst error is 4.6e-15 of a column's peak.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +9,7 @@ use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Never;
 
-/// What is allowed beside the column's largest value over the states looked at: the documents' numbers are those of the reference to the last bit.
+/// Allowed error over the column's largest compared value. The reference has exactly the documents' numbers.
 const TOLERANCE: f64 = 1e-12;
 
 const CONTACTS: [&str; 3] = ["wave_generator", "ring", "carrier"];
@@ -36,7 +37,7 @@ fn asked(question: &impl Question, document: &Value) -> Value {
 }
 
 #[test]
-fn every_force_stress_and_wind_up_of_every_kind_is_that_of_the_reference() {
+fn every_kind_matches_the_reference() {
     let mut worst = BTreeMap::new();
     let mut compared = 0;
     for case in cases() {
@@ -47,7 +48,7 @@ fn every_force_stress_and_wind_up_of_every_kind_is_that_of_the_reference() {
         let period_deg = number(&answer["period_deg"]);
         let lobes = states.get("lobe").and_then(Value::as_array);
         assert_eq!(lobes.is_none(), case["alike"].as_bool().unwrap(), "{name}");
-        // By column: what it is off by, and its largest value.
+        // Error and largest value of each column.
         let mut columns: BTreeMap<String, (f64, f64)> = BTreeMap::new();
         let mut compare = |name: &str, found: f64, expected: f64| {
             compared += 1;
@@ -81,7 +82,7 @@ fn every_force_stress_and_wind_up_of_every_kind_is_that_of_the_reference() {
                     }
                 }
             }
-            // What is listed besides stands at a regular tip, where it bears nothing.
+            // Additional states are unloaded teeth at a regular tip.
             for &row in &rows {
                 let position_deg = number(&column(states, "position_deg")[row]);
                 let is_known = teeth.iter().any(|tooth| (number(&tooth["position_deg"]) - position_deg).abs() < 1e-9);
@@ -113,7 +114,7 @@ fn every_force_stress_and_wind_up_of_every_kind_is_that_of_the_reference() {
 }
 
 #[test]
-fn whichever_member_is_fixed_and_whichever_drives_speeds_are_those_of_rolling_contacts() {
+fn speeds_are_those_of_rolling_contacts() {
     for case in cases() {
         let answer = asked(&Geometry, &case["document"]);
         for (fixed, expected) in case["members"].as_object().unwrap() {
@@ -121,7 +122,7 @@ fn whichever_member_is_fixed_and_whichever_drives_speeds_are_those_of_rolling_co
             let member = &answer["members"][format!("{fixed}_fixed")];
             let found = number(&member["ratio"]);
             assert!((found / ratio - 1.0).abs() < 1e-15, "{}, {fixed} fixed: {found} is not {ratio}", case["name"]);
-            // What goes in comes out, and the three torques balance.
+            // Power is conserved and the three torques balance.
             let held = number(&member["holding_torque_ratio"]);
             assert!((held - (ratio - 1.0)).abs() < 1e-14 * ratio.abs(), "{}, {fixed} fixed: {held}", case["name"]);
         }

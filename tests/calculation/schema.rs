@@ -1,11 +1,11 @@
-//! Documents made from the schema of the design document: what the schema knows is what is tried.
+//! Random documents made from the schema of the design document.
 
 use serde_json::{Map, Value, json};
 use toothwave_calculation::design::Design;
 use utoipa::openapi::{RefOr, schema::Schema};
 use utoipa::{PartialSchema as _, ToSchema as _};
 
-/// The schema of the design document and of all that it refers to.
+/// The schema of the design document with all its references.
 pub(crate) struct Schemas {
     design: Value,
     by_name: Map<String, Value>,
@@ -22,7 +22,7 @@ impl Schemas {
         }
     }
 
-    /// A document by the schema: what is required, and of the rest what chance decides.
+    /// Returns a document with all required fields and a random choice of optional ones.
     pub(crate) fn document(&self, chance: &mut Chance) -> Value {
         self.value(&self.design, chance)
     }
@@ -61,7 +61,7 @@ impl Schemas {
     }
 }
 
-/// Most often an ordinary number, now and then an end of the range.
+/// Returns an ordinary number, or sometimes an end of the range.
 fn number(schema: &Value, chance: &mut Chance) -> f64 {
     let bound = |closed: &str, open: &str| {
         schema[closed].as_f64().unwrap_or_else(|| schema[open].as_f64().unwrap_or_else(|| panic!("no range: {schema}")))
@@ -75,7 +75,7 @@ fn number(schema: &Value, chance: &mut Chance) -> f64 {
     }
 }
 
-/// A sequence that follows from its seed (Marsaglia's xorshift).
+/// A reproducible random generator (Marsaglia's xorshift).
 pub(crate) struct Chance(u64);
 
 impl Chance {
@@ -99,7 +99,7 @@ impl Chance {
     }
 }
 
-/// Pointers to everything in a document that holds nothing further.
+/// Returns pointers to all leaves of a document.
 pub(crate) fn leaves(value: &Value, at: &str) -> Vec<String> {
     let below = |(name, value): (String, &Value)| leaves(value, &format!("{at}/{name}"));
     match value {
@@ -111,7 +111,7 @@ pub(crate) fn leaves(value: &Value, at: &str) -> Vec<String> {
     }
 }
 
-/// Pointers to all objects.
+/// Returns pointers to all objects.
 pub(crate) fn objects(value: &Value, at: &str) -> Vec<String> {
     let Some(fields) = value.as_object() else { return Vec::new() };
     let below = fields.iter().flat_map(|(name, value)| objects(value, &format!("{at}/{name}")));

@@ -1,4 +1,4 @@
-//! A sweep's states as an Arrow stream: the columns of CSV and JSON, without text.
+//! A sweep's states as an Arrow stream, with the columns of CSV and JSON.
 
 use arrow_array::{Array, BooleanArray, Float64Array, StringArray, UInt32Array};
 use arrow_ipc::reader::StreamReader;
@@ -18,7 +18,7 @@ fn drive() -> Value {
     })
 }
 
-/// An entry as JSON has it.
+/// Returns an entry as JSON.
 fn entry(column: &dyn Array, row: usize) -> Value {
     let column = column.as_any();
     if let Some(numbers) = column.downcast_ref::<Float64Array>() {
@@ -33,10 +33,10 @@ fn entry(column: &dyn Array, row: usize) -> Value {
 }
 
 #[test]
-fn an_arrow_stream_has_the_columns_of_csv_and_the_numbers_of_json() {
+fn arrow_stream_has_csv_columns_and_json_numbers() {
     let friction = json!({ "wave_generator": { "kind": "plain", "coefficient": 0.03 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.04 } });
     for document in [
-        // More states than a batch holds.
+        // The sweep has more states than a batch holds.
         json!({ "drive": drive(), "load": { "input_torque_nm": 20.0 }, "sweep": { "samples": 10_000 } }),
         json!({ "drive": drive(), "load": { "input_torque_nm": 20.0 }, "friction": friction, "model": { "clearance": { "ring_um": 5.0 } } }),
         json!({ "drive": drive(), "load": { "input_torque_nm": 20.0 }, "deviations": { "wave_generator_lobe_um": [0.0, 1.0] }, "model": { "clearance": { "wave_generator_um": 5.0 } }, "sweep": { "samples": 5 } }),
@@ -76,9 +76,9 @@ fn an_arrow_stream_has_the_columns_of_csv_and_the_numbers_of_json() {
     }
 }
 
-/// Its buffer takes as much room, and would otherwise be there twice while it grows: of few teeth what stands by input angle is as long as the states.
+/// A growing buffer takes its memory twice. With few teeth, columns by input angle are as long as the state columns.
 #[test]
-fn how_long_a_sweep_gets_as_json_is_known_before_it_is_written() {
+fn json_length_of_sweep_is_known_beforehand() {
     let friction = json!({ "wave_generator": { "kind": "plain", "coefficient": 0.03 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.04 } });
     let eccentric = json!({
         "wave_generator": { "kind": "eccentric", "radius_mm": 30.8, "eccentricity_mm": 1.2 },
@@ -96,7 +96,7 @@ fn how_long_a_sweep_gets_as_json_is_known_before_it_is_written() {
         let mut bytes = Vec::new();
         answer.write(Format::Json, &mut bytes).unwrap();
         let share = answer.expected_bytes() as f64 / bytes.len() as f64;
-        // Efficiencies of which nothing is left are short.
+        // Efficiencies of zero have short text.
         assert!((1.0..1.35).contains(&share), "{share} of {} bytes", bytes.len());
     }
 }

@@ -2,7 +2,7 @@
 
     check.py URL        with ezdxf installed (PyPI)
 
-The ring's area is that of the envelope as docs/theory.md section 2 derives it, written here anew: contact points of the moving tooth,
+The ring's area is that of the envelope as docs/explanation/theory.md section 2 derives it, written here anew: contact points of the moving tooth,
 as many as the areas are compared to.
 """
 

@@ -1,6 +1,6 @@
 """What gives way behind the contacts, by finite elements: fingers, free rims, and bodies held at their backs; writes backing.json beside this file.
 
-Each is a compliance of one contact as the solver estimates it (docs/theory.md 4.10): displacement over force, in mm/N, weighted by the forces
+Each is a compliance of one contact as the solver estimates it (docs/explanation/theory.md 4.10): displacement over force, in mm/N, weighted by the forces
 where there are several, so that the work is the same.
 """
 

@@ -1,4 +1,4 @@
-"""Holds the service's model against results.json: the tables of docs/validation.md on standard output, and its plots beside it.
+"""Holds the service's model against results.json: the tables of docs/explanation/validation.md on standard output, and its plots beside it.
 
 usage: compare.py TOOTHWAVE, the built program
 """
@@ -15,7 +15,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
 HERE = Path(__file__).parent
-PLOTS = HERE.parent.parent / "docs" / "validation"
+PLOTS = HERE.parent.parent / "docs" / "explanation" / "validation"
 # Each input angle of the cases is one of so many equal intervals of its drive's period; the more of them are for cases whose teeth lie aside in their slots.
 INTERVALS, OF_THESE = 240, 25
 CYLINDER_5_1 = {"count": 28, "radius_mm": 5.0, "width_mm": 15.0}

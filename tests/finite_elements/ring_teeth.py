@@ -1,6 +1,6 @@
 """What the model leaves out in case 5.2: how the ring's pointed teeth bend, and that the wave generator moves on under its teeth as it winds up.
 
-Writes ring_teeth.json, what the ring gives way under each tooth beyond a straight wall, beside this file, and prints the tables of docs/validation.md. The model is
+Writes ring_teeth.json, what the ring gives way under each tooth beyond a straight wall, beside this file, and prints the tables of docs/explanation/validation.md. The model is
 written down here a second time, so that both can be put into it. `ring_teeth.py tables` takes the ring's compliance from the file.
 """
 

@@ -15,7 +15,7 @@ from service import running_service
 from theory import Theory
 
 CAM_TOO_ROUND = (
-    "Values that no design can have\n/drive/wave_generator/semi_major_mm: the semi-major axis (50.0 mm) must exceed "
+    "The design is impossible\n/drive/wave_generator/semi_major_mm: the semi-major axis (50.0 mm) must exceed "
     "the semi-minor axis (56.0 mm): a round cam moves no tooth"
 )
 
@@ -83,7 +83,7 @@ class Object(OfDrive):
         self.drive.ToothWidth = 20
         self.document.recompute()
         self.assertAlmostEqual(self.document.Teeth.Shape.BoundBox.ZMax, 20)
-        self.assertEqual((self.cell("A1"), self.cell("A2")), ("Problem", "The document has another form than is read here"))
+        self.assertEqual((self.cell("A1"), self.cell("A2")), ("Problem", "The document has the wrong form"))
         self.assertTrue(self.cell("A3").startswith("/load: forces need a load"))
         self.assertNotIn("Invalid", self.drive.State)
 

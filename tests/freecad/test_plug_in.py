@@ -1,4 +1,4 @@
-"""docs/plug-ins.md shows a whole program: the file itself, and it runs."""
+"""docs/how-to/plug-ins.md shows a whole program: the file itself, and it runs."""
 
 import importlib.util
 import os
@@ -29,7 +29,7 @@ def run(url, design, **environment):
 class PlugIn(unittest.TestCase):
     def test_the_page_shows_the_file_verbatim(self):
         self.assertIn(
-            f"```python\n{PROGRAM.read_text(encoding='utf-8')}```\n", (ROOT / "docs/plug-ins.md").read_text(encoding="utf-8")
+            f"```python\n{PROGRAM.read_text(encoding='utf-8')}```\n", (ROOT / "docs/how-to/plug-ins.md").read_text(encoding="utf-8")
         )
 
     def test_it_gets_every_part_and_what_it_has_is_not_sent_again(self):
@@ -54,7 +54,7 @@ class PlugIn(unittest.TestCase):
             design.write_text(example.replace("58.0", "50.0"), encoding="utf-8")
             done = run(url, design)
         self.assertEqual(done.returncode, 1)
-        self.assertIn("Values that no design can have\n/drive/wave_generator/semi_major_mm: ", done.stderr)
+        self.assertIn("The design is impossible\n/drive/wave_generator/semi_major_mm: ", done.stderr)
 
 
 class NoAnswer(unittest.TestCase):

@@ -1,4 +1,4 @@
-"""Areas and positions from the theory alone (docs/theory.md), to hold the solids against.
+"""Areas and positions from the theory alone (docs/explanation/theory.md), to hold the solids against.
 
 Nothing here asks the service or FreeCAD. Everything is written over a parameter of the wave generator of which the tooth's
 position psi is an explicit function: the angle phi of the cam's outward normal, or, of a path that is given, psi itself. For cams

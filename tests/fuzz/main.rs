@@ -1,7 +1,7 @@
-//! Whatever the document, there is an answer in numbers or a reason: no panic, no number that is none, no endless loop.
+//! Fuzz targets. Any document gets finite numbers or a reason, without a panic or an endless loop.
 //!
-//! `cargo test` replays the committed corpus and tries some more at random beside it, the same ones again with `PROPTEST_RNG_SEED`;
-//! `cargo bolero test NAME -p toothwave-calculation` hands the same targets to a coverage-guided fuzzer.
+//! `cargo test` replays the committed corpus and adds random inputs, which `PROPTEST_RNG_SEED` makes reproducible.
+//! `cargo bolero test NAME -p toothwave-calculation` runs the same targets with a coverage-guided fuzzer.
 #![allow(clippy::unwrap_used, reason = "a fuzz target fails by panicking")]
 
 use proptest::prelude::*;
@@ -19,24 +19,24 @@ use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::{Deviations, Never};
 
-/// Small enough for thousands of answers.
+/// Limits small enough for thousands of answers.
 const LIMITS: Limits = Limits::new(2_000, 20_000);
 
 fn assert_answered<Q: Question>(question: Q, design: &Design) {
     let answered = question.check(design, &LIMITS).and_then(|checked| Q::answer(&checked, &Never));
     match answered {
-        // serde_json writes null where a number is none.
+        // serde_json writes a non-finite number as null.
         Ok(answer) => {
             for format in Q::Answer::FORMS.iter().map(|(format, _)| *format).chain([Format::Json]) {
                 let mut written = Vec::new();
                 answer.write(format, &mut written).unwrap();
-                // Bytes of the numbers that the text has too.
+                // The bytes of numbers also appear in the text.
                 if matches!(format, Format::Arrow | Format::Parquet) {
                     continue;
                 }
                 let text = String::from_utf8(written).unwrap();
                 let is_none = match format {
-                    // serde_json writes null where a number is none; elsewhere a word may be `info`.
+                    // serde_json writes a non-finite number as null. In other formats a word may contain `inf`.
                     Format::Json => text.contains("null"),
                     Format::Text => text.contains("NaN"),
                     _ => text.contains("NaN") || text.contains("inf"),
@@ -73,14 +73,14 @@ fn any_text() {
     bolero::check!().with_iterations(3_000).for_each(assert_text_is_answered);
 }
 
-/// Bytes drawn at random, as often as asked for.
+/// Runs a test on random bytes this many times.
 fn drawn<const BYTES: usize>(cases: u32, test: impl Fn(&[u8; BYTES])) {
     let config = ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() };
     let bytes = prop::collection::vec(any::<u8>(), BYTES);
     proptest!(config, |(bytes in bytes)| test(&bytes.try_into().unwrap()));
 }
 
-/// A length between the ends of its range, most often an ordinary one.
+/// Returns a length within its range, most often an ordinary one.
 fn length_mm(byte: u8) -> f64 {
     match byte {
         0..16 => 1e-6 * f64::from(byte + 1),
@@ -89,7 +89,7 @@ fn length_mm(byte: u8) -> f64 {
     }
 }
 
-/// A document of the right form: ratios of lengths that drives have, and numbers from all over the ranges.
+/// Returns a well-formed document with usual ratios of lengths and numbers across all ranges.
 fn document(bytes: &[u8; 20]) -> Value {
     let [scale, flattening, half, removal, thickness, more, bore, torque, form, law, rest @ ..] = *bytes;
     let a = length_mm(scale);
@@ -149,7 +149,7 @@ fn document(bytes: &[u8; 20]) -> Value {
     if rest[6] % 2 == 0 {
         load["input_speed_rpm"] = json!(10.0_f64.powi(i32::from(rest[6] % 13) - 6));
     }
-    // Radii about where they have to lie, clearances from none to more than a tooth.
+    // Radii near their possible range, and clearances from zero to above a tooth.
     let about = |byte: u8| 0.5 + f64::from(byte) / 170.0;
     let clearance = |byte: u8| if byte < 128 { 0.0 } else { 1e3 * r * (f64::from(byte) - 127.0) / 100.0 };
     let parts = json!({
@@ -184,7 +184,7 @@ fn any_drive() {
     drawn(1_000, is_answered);
 }
 
-/// A number of either sign, most often none, of a size from all over its range.
+/// Returns a signed number of any size within its range, most often zero.
 fn deviation(byte: u8, largest: f64) -> f64 {
     let size = largest * 10.0_f64.powi(-i32::from(byte % 8));
     match byte / 8 % 4 {
@@ -194,7 +194,7 @@ fn deviation(byte: u8, largest: f64) -> f64 {
     }
 }
 
-/// A document of any kind, shape and law, which fit each other most often, with modifications and deviations.
+/// Returns a document of any kind, shape and law, with modifications and deviations. Most fit each other.
 fn relative(bytes: &[u8; 48]) -> Value {
     let [kind, size, stroke, lobes, half, removal, thickness, sense, bore, shape, rest @ ..] = *bytes;
     let [grooves, groove, flat, law, depth, series, form, torque, points, gap, modified, rest @ ..] = rest;
@@ -272,7 +272,7 @@ fn relative(bytes: &[u8; 48]) -> Value {
         model["corner_contact"] = json!(true);
     }
     if gap % 2 == 0 {
-        // Most often enough for what is too full.
+        // Most often enough to cover an interference.
         let clearance = |_| 1e3 * r * 10.0_f64.powi(-i32::from(gap % 9));
         let gaps = by_contact(7, &clearance);
         model["clearance"] = json!({ "wave_generator_um": gaps["wave_generator"], "ring_um": gaps["ring"], "carrier_um": gaps["carrier"] });
@@ -312,7 +312,7 @@ fn relative(bytes: &[u8; 48]) -> Value {
     document
 }
 
-/// Now and then one list, most often of the right length, and now and then a runout; few enough for the sweep to stay short.
+/// Returns deviations: sometimes one list, mostly of the right length, and sometimes a runout. Few keep sweeps short.
 fn deviations(list: u8, of_parts: &[u8], entries: &[u8], items: [i64; 3], size_um: f64) -> Value {
     let [slots, spaces, lobes] = items;
     let (name, count, size) = [
@@ -343,9 +343,9 @@ fn any_member_of_the_family() {
     drawn(600, is_answered);
 }
 
-/// Documents of this kind would test nothing if none of them were possible.
+/// The fuzz documents would test nothing if none of them were possible.
 #[test]
-fn most_kinds_shapes_and_laws_are_among_those_that_have_an_answer() {
+fn most_kinds_shapes_and_laws_have_an_answer() {
     let mut answered = std::collections::BTreeSet::new();
     let mut state = 1_u64;
     for _ in 0..4_000 {

@@ -144,7 +144,7 @@ def main():
     axes[0].set_ylabel("hypervolume that is missing")
     axes[0].legend(fontsize=8)
     plt.rcParams["svg.hashsalt"] = "optimisers"
-    figure.savefig(HERE / "../../docs/optimisers.svg", metadata={"Date": None})
+    figure.savefig(HERE / "../../benches/results/optimisers.svg", metadata={"Date": None})
     (HERE / "results.json").write_text(json.dumps(results, indent=1) + "\n")
     lines = ["| problem, evaluations | " + " | ".join(NAMES.values()) + " |", "|---|" + "---|" * len(NAMES)]
     for name, result in results.items():

@@ -1,4 +1,4 @@
-// What a new user meets: the first design, choices that change others, remedies, numbers as people type them.
+// A new user: first design, choices that change others, remedies, numbers as people type them.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -20,7 +20,7 @@ test('opens on the default model', async () => {
   assert.match(await page.textContent(`${field('/model/compatibility')} option[value=projection]`), /^As in the paper/);
 });
 
-test('tells what else a choice changed', async () => {
+test('notice lists further changes made by a choice', async () => {
   const page = await bed.open({ example: null });
   await page.selectOption(field('/drive/wave_generator'), 'eccentric');
   await settled(page);
@@ -48,7 +48,7 @@ const REMEDIED = {
   stress_above_allowable: { drive: CASE_5_1, load: { ...LOAD, allowable_stress_mpa: 500 } },
 };
 
-test('a remedy that is a value is applied by a button', async () => {
+test('button applies a remedy with a value', async () => {
   const page = await bed.open();
   const codes = async (design) => (await bed.server.answers(design)).sweep.findings.map(({ code }) => code);
   for (const [code, design] of Object.entries(REMEDIED)) {
@@ -61,7 +61,7 @@ test('a remedy that is a value is applied by a button', async () => {
     await settled(page);
     assert.ok((await codes(await designOf(page))).filter((other) => other === code).length < count, `${code} is gone`);
   }
-  // At the field too.
+  // The field has the button too.
   await setDocument(page, REMEDIED.undercut);
   await page.click(`${notes(RADIUS)} .remedy`);
   await settled(page);
@@ -69,7 +69,7 @@ test('a remedy that is a value is applied by a button', async () => {
   assert.doesNotMatch(await page.textContent(notes(RADIUS)), /Undercut/);
 });
 
-test('a new ratio stays and says what follows', async () => {
+test('new ratio stays and lists its consequences', async () => {
   const page = await bed.open({ example: null });
   await page.fill(field('/ratio'), '30');
   await page.press(field('/ratio'), 'Enter');
@@ -81,7 +81,7 @@ test('a new ratio stays and says what follows', async () => {
   assert.equal(await page.inputValue(field('/find/ratio')), '30');
 });
 
-test('numbers are understood as people type them', async () => {
+test('numbers are accepted as people type them', async () => {
   const page = await bed.open();
   for (const [text, value] of [['５，５', 5.5], ['5,5mm', 5.5], ['5.25 mm', 5.25], ['４．７５', 4.75], ['5 ㎜', 5]]) {
     await enter(page, RADIUS, text);
@@ -95,7 +95,7 @@ test('numbers are understood as people type them', async () => {
   assert.match(await page.textContent(notes(RADIUS)), /not a number in mm/);
 });
 
-test('every field is explained, every number has a symbol', async () => {
+test('every field has explanation, every number a symbol', async () => {
   const page = await bed.open();
   const fields = await page.evaluate(async () => {
     const { GROUPS, fieldsOf } = await import('/page/design.js');
@@ -112,7 +112,7 @@ test('every field is explained, every number has a symbol', async () => {
   assert.match(await page.textContent('.definition:popover-open'), /Slots in theory/);
 });
 
-test('the head has few buttons', async () => {
+test('head has few buttons', async () => {
   const page = await bed.open({ viewport: { width: 1440, height: 900 } });
   const labels = await page.$$eval('.tools button', (buttons) => buttons.map((button) => button.getAttribute('aria-label') ?? button.textContent));
   assert.deepEqual(labels, ['Examples', 'Undo', 'Redo', 'Keep as reference', 'Download', 'Menu']);
@@ -122,7 +122,7 @@ test('the head has few buttons', async () => {
   await pick(page, '#print');
 });
 
-test('residuals and depths stand behind More', async () => {
+test('More shows residuals and depths', async () => {
   const page = await bed.open();
   const residual = page.locator('#table tr', { hasText: 'Torque balance, residual' });
   assert.ok(!(await residual.isVisible()));
@@ -131,7 +131,7 @@ test('residuals and depths stand behind More', async () => {
   assert.match(await page.locator('#table .group').first().textContent(), /^Peaks over a period/);
 });
 
-test('the animation stops after three turns', async () => {
+test('animation stops after three turns', async () => {
   const page = await bed.open({ hasClock: true });
   await page.click('#play');
   await page.clock.runFor(59_000);
@@ -140,7 +140,7 @@ test('the animation stops after three turns', async () => {
   assert.equal(await page.textContent('#play'), 'Play');
 });
 
-test('the animation stops out of sight', async () => {
+test('animation stops out of sight', async () => {
   const page = await bed.open();
   await page.click('#play');
   await page.evaluate(() => scrollTo(0, document.body.scrollHeight));

@@ -1,4 +1,4 @@
-// The real binary and a real Chromium.
+// Tests run the real binary and a real Chromium.
 
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
@@ -115,7 +115,7 @@ export async function open(browser, server, { address, example = 'paper-5.1', ha
     ...options,
   });
   const page = await context.newPage();
-  // A machine that has much else to do is slow, not wrong.
+  // A busy machine needs longer.
   context.setDefaultTimeout(120_000);
   page.faults = [];
   page.expectsOutage = false;
@@ -123,7 +123,7 @@ export async function open(browser, server, { address, example = 'paper-5.1', ha
   page.on('console', (message) => {
     if (!['error', 'warning'].includes(message.type())) return;
     const text = message.text();
-    // The browser itself logs each refused or failed request; refusals are what some tests are about.
+    // The browser logs each refused or failed request, and some tests cause refusals.
     if (text.includes('status of 422')) return;
     if (page.expectsOutage && /Failed to load resource: net::ERR_/.test(text)) return;
     page.faults.push(`${message.type()}: ${text}`);
@@ -133,7 +133,7 @@ export async function open(browser, server, { address, example = 'paper-5.1', ha
     if (!url.startsWith(server.origin) && !url.startsWith('blob:') && !url.startsWith('data:')) page.faults.push(`request to ${url}`);
   });
   if (PAGE_FOLDER) await servePageFrom(context, server, PAGE_FOLDER);
-  // A clock that the test can put forward.
+  // A clock that the test can move forward.
   if (hasClock) await page.clock.install();
   const link = address ?? (example ? `#design=${Buffer.from(JSON.stringify(await server.example(example))).toString('base64url')}` : '');
   await page.goto(`${server.origin}/${link}`);
@@ -155,7 +155,7 @@ const TYPES = { html: 'text/html; charset=utf-8', js: 'text/javascript; charset=
 /** Waits until the page shows the answers about the design that stands in its form. */
 export async function settled(page) {
   await page.waitForFunction(() => document.querySelector('#key-figures').getAttribute('aria-busy') === 'false', undefined, { timeout: 60_000 });
-  // One frame more, for what is drawn once a frame.
+  // One more frame, for drawings once a frame.
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
 }
 

@@ -1,4 +1,4 @@
-// Wave generators, teeth and contact laws of each kind: chosen in the form, calculated, drawn.
+// Each kind of wave generators, teeth and contact laws: chosen in the form, calculated, drawn.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -45,7 +45,7 @@ const balance = (page, design, { geometry, sweep }) =>
             const reach = key === 'carrier' ? motion.toSlotWallMm : motion.toothRadius;
             worst.outline = Math.max(worst.outline, Math.abs(distance - reach));
           }
-          // A tooth that has only just come to the flank carries nothing yet.
+          // A tooth that has just reached the flank is unloaded.
           if (force.ring > 0) worst.force = Math.max(worst.force, Math.hypot(sum.x, sum.y) / force.ring);
           worst.outline = Math.max(worst.outline, Math.abs(motion.positionDeg(tooth, angle) - positionDeg) % (2 * motion.halfLobeDeg - 1e-9));
           worst.lobes.add(zone);
@@ -62,7 +62,7 @@ for (const [kind, fields, lobes] of [
   ['harmonic', ['lobes', 'mean_radius_mm', 'amplitude_mm'], 3],
   ['harmonic_path', ['lobes', 'mean_path_radius_mm', 'amplitude_mm'], 3],
 ]) {
-  test(`wave generator ${kind}: chosen, its ring follows, its result stands and its ${lobes} lobes are drawn`, async () => {
+  test(`wave generator ${kind} is calculated and drawn with ${lobes} lobes`, async () => {
     const page = await bed.open();
     if (kind === 'ellipse') await pick(page, WAVE_GENERATOR, 'eccentric');
     await pick(page, WAVE_GENERATOR, kind);
@@ -82,7 +82,7 @@ for (const [kind, fields, lobes] of [
   });
 }
 
-test('an ellipse becomes the other kinds of its own size, and comes back', async () => {
+test('ellipse changes to kinds of equal size and back', async () => {
   const page = await bed.open();
   await pick(page, WAVE_GENERATOR, 'eccentric');
   assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'eccentric', radius_mm: 57, eccentricity_mm: 1 });
@@ -95,7 +95,7 @@ test('an ellipse becomes the other kinds of its own size, and comes back', async
   assert.deepEqual([drive.wave_generator, drive.ring.teeth], [{ semi_major_mm: 58, semi_minor_mm: 56 }, 26]);
 });
 
-test('a ring with more teeth than slots stays so when the lobes change', async () => {
+test('ring with more teeth stays so with other lobes', async () => {
   const page = await bed.open();
   await choose(page, 'ring-with-more-teeth');
   const { drive: before } = await designOf(page);
@@ -104,7 +104,7 @@ test('a ring with more teeth than slots stays so when the lobes change', async (
   assert.equal((await designOf(page)).drive.ring.teeth, before.teeth.count + 1);
 });
 
-test('unlike zones are told as such: all their teeth are counted, each on its lobe', async () => {
+test('unlike zones count all teeth, each on its lobe', async () => {
   const page = await bed.open();
   await pick(page, WAVE_GENERATOR, 'harmonic');
   await enter(page, `${WAVE_GENERATOR}/lobes`, 3);
@@ -114,7 +114,7 @@ test('unlike zones are told as such: all their teeth are counted, each on its lo
   const worst = await balance(page, found.design, found);
   assert.equal(worst.lobes, 3);
   assert.ok(worst.force < 2e-3 && worst.outline < 2e-3, JSON.stringify(worst));
-  // One curve: what a tooth carries follows from where it stands alone.
+  // One curve: a tooth's load depends only on its place.
   const { positions, breaks } = await page.evaluate(
     async ({ design, sweep }) => {
       const { passOf } = await import('/page/pass.js');
@@ -125,7 +125,7 @@ test('unlike zones are told as such: all their teeth are counted, each on its lo
   );
   positions.forEach((deg, index) => assert.ok(index === 0 || deg < positions[index - 1] - 1e-9));
   assert.equal(breaks, 0, 'nothing jumps');
-  // With a slot number that three lobes share alike, one zone stands for all.
+  // With a slot count divisible by three, one zone represents all.
   await enter(page, `${TEETH}/installed`, '');
   await enter(page, `${TEETH}/count`, 30);
   await enter(page, '/drive/ring/teeth', 27);
@@ -133,7 +133,7 @@ test('unlike zones are told as such: all their teeth are counted, each on its lo
   assert.ok((await resultOf(page, 'Most teeth in mesh, each zone')) > 0);
 });
 
-test('a ratio counts in thirds where there are three lobes, in halves where there are two', async () => {
+test('ratio steps follow the number of lobes', async () => {
   const page = await bed.open();
   const counts = async (ratio) => {
     await page.fill(field('/ratio'), ratio);
@@ -154,7 +154,7 @@ for (const [shape, fields] of [
   ['ball', ['wave_generator', 'ring', 'carrier', 'count', 'installed']],
   ['flat_sided', ['width_mm', 'flat_length_mm', 'count', 'installed']],
 ]) {
-  test(`teeth ${shape}: chosen, only their fields are shown, their result stands and they are drawn`, async () => {
+  test(`teeth ${shape} have own fields, are calculated and drawn`, async () => {
     const page = await bed.open();
     if (shape === 'cylinder') await pick(page, TEETH, 'ball');
     await pick(page, TEETH, shape);
@@ -167,7 +167,7 @@ for (const [shape, fields] of [
     assert.ok(worst.force < 2e-3 && worst.outline < 2e-3, JSON.stringify(worst));
     const tags = await page.$$eval('#whole .tooth', (teeth) => [...new Set(teeth.map(({ tagName }) => tagName))]);
     assert.deepEqual(tags, [shape === 'flat_sided' ? 'path' : 'circle']);
-    // A slot is as wide as what lies on its walls.
+    // Slot width follows from the tooth's part at its walls.
     const corner = found.geometry.carrier.finger.corners.y_mm[0];
     assert.ok(Math.abs(corner - Math.sqrt(25 - (found.design.drive.teeth.flat_length_mm ?? 0) ** 2 / 4)) < 1e-9);
     if (shape === 'ball') {
@@ -189,7 +189,7 @@ for (const [law, fields, pointer, value] of [
   ['johnson', ['wave_generator', 'ring', 'carrier'], `${LAW}/depth_mm/ring`, 8],
   ['fixed', ['wave_generator_n_per_mm', 'ring_n_per_mm', 'carrier_n_per_mm'], `${LAW}/ring_n_per_mm`, 400000],
 ]) {
-  test(`contact law ${law}: chosen, only its fields are shown, and what they say moves the answer`, async () => {
+  test(`contact law ${law} has own fields, which change answer`, async () => {
     const page = await bed.open();
     await pick(page, '/model/compatibility', 'virtual_work');
     await pick(page, LAW, law === 'linear' ? 'johnson' : law);
@@ -205,7 +205,7 @@ for (const [law, fields, pointer, value] of [
   });
 }
 
-test('projection takes no law of Johnson’s: choosing either leaves a design that is possible', async () => {
+test('choosing projection or Johnson’s law keeps design possible', async () => {
   const page = await bed.open();
   await pick(page, '/model/compatibility', 'projection');
   await pick(page, LAW, 'johnson');
@@ -214,7 +214,7 @@ test('projection takes no law of Johnson’s: choosing either leaves a design th
   assert.equal((await answered(page)).design.model.stiffness.law, 'linear');
 });
 
-test('a document that names no model shows the one that the service takes', async () => {
+test('document without model shows the service’s model', async () => {
   const page = await bed.open();
   const { model, ...unnamed } = await designOf(page);
   assert.ok(model, 'the paper’s examples name theirs');
@@ -232,10 +232,10 @@ test('a document that names no model shows the one that the service takes', asyn
   }
 });
 
-test('the peaks say how far to believe them', async () => {
+test('peaks state their model error', async () => {
   const page = await bed.open();
   const told = () => page.$$eval('#table .told', (lines) => lines.map((line) => line.textContent));
-  // The paper's model, whose forces are too large; no wind-up is asked for.
+  // The paper's model, whose forces are too large, without wind-up.
   const estimated = 'From the parts as they are made; forces leave it out until it is taken over.';
   assert.deepEqual(await told(), ['The model’s own error: force +1 to +8 %, stress −1 to +5 %; not measured with other sizes and loads under its law.', '', estimated]);
   const { model, ...unnamed } = await designOf(page);
@@ -253,7 +253,7 @@ test('the peaks say how far to believe them', async () => {
   assert.equal((await told())[0], 'The model’s own error: not measured under this law.');
 });
 
-test('what the service sets by itself can be denied, and stands in the form as the document has it', async () => {
+test('service’s choices can be overridden in the form', async () => {
   const page = await bed.open();
   const { model: _, ...unnamed } = await bed.server.example('paper-5.2');
   await setDocument(page, unnamed);
@@ -275,7 +275,7 @@ test('what the service sets by itself can be denied, and stands in the form as t
   assert.equal(await page.inputValue(field(place)), 'none');
 });
 
-test('an old document is converted, with a notice', async () => {
+test('old document is converted with a notice', async () => {
   const page = await bed.open();
   const { model: _, ...unnamed } = await bed.server.example('paper-5.2');
   const old = { ...unnamed, model: { clearance: { ring_um: 10 }, corner_contact: true } };
@@ -285,7 +285,7 @@ test('an old document is converted, with a notice', async () => {
   assert.match(await page.textContent('#notice-text'), /earlier version/);
 });
 
-test('what gives way behind a contact moves the answer', async () => {
+test('series compliance changes the answer', async () => {
   const page = await bed.open();
   await pick(page, '/model/compatibility', 'virtual_work');
   const before = await answered(page);
@@ -296,7 +296,7 @@ test('what gives way behind a contact moves the answer', async () => {
   assert.notEqual(after.sweep.peaks.ring.force_n.value, before.sweep.peaks.ring.force_n.value);
 });
 
-test('an estimate of what gives way behind a contact is taken over into the design', async () => {
+test('button copies a compliance estimate into the design', async () => {
   const page = await bed.open();
   await setDocument(page, { drive: (await designOf(page)).drive, load: { input_torque_nm: 20 }, parts: { carrier: { fingers: 'held_at_one_end' } } });
   const before = await answered(page);
@@ -309,13 +309,13 @@ test('an estimate of what gives way behind a contact is taken over into the desi
   assert.equal(after.design.model.series_compliance_mm_per_n.carrier, Number(estimate.toPrecision(3)));
   assert.ok(!after.sweep.findings.some(({ code }) => code === 'slender_fingers'));
   assert.ok(after.sweep.peaks.carrier.force_n.value < before.sweep.peaks.carrier.force_n.value);
-  // What is said of the fingers can be unsaid.
+  // The choice of fingers can be removed.
   await page.click('summary:has-text("Parts as they are made")');
   await pick(page, '/parts/carrier/fingers', '');
   assert.ok(!('fingers' in ((await answered(page)).design.parts?.carrier ?? {})));
 });
 
-test('an estimate taken over where the paper’s model is chosen brings the model along that takes it', async () => {
+test('copying an estimate replaces the paper’s model', async () => {
   const page = await bed.open();
   await setDocument(page, { drive: (await designOf(page)).drive, load: { input_torque_nm: 20 }, model: { compatibility: 'projection', stiffness: { law: 'linear' } } });
   await answered(page);
@@ -328,7 +328,7 @@ test('an estimate taken over where the paper’s model is chosen brings the mode
   assert.ok(sweep.peaks.ring.force_n.value > 0);
 });
 
-test('stresses by contact and lists of deviations are inputs that two designs may differ in', async () => {
+test('comparison lists stresses by contact and deviations', async () => {
   const page = await bed.open();
   const load = { input_torque_nm: 20 };
   const { drive } = await designOf(page);
@@ -343,7 +343,7 @@ test('stresses by contact and lists of deviations are inputs that two designs ma
   assert.match(told, /Teeth thinner in radius, each – → 28, 0 to 2.5 µm/);
 });
 
-test('a document with kinds spelled out opens as it is, in the form and in a link', async () => {
+test('document with explicit kinds opens in form and link', async () => {
   const design = {
     drive: {
       wave_generator: { kind: 'eccentric', radius_mm: 30.8, eccentricity_mm: 1.2 },
@@ -372,7 +372,7 @@ function* valuesOf(schemas, schema, pointer = '') {
   else if (schema.type !== 'null') yield { pointer, schema };
 }
 
-// What has no field on the page, and why; it stands in the JSON.
+// Values without a field on the page, with the reason. The JSON view has them.
 const NOT_IN_THE_FORM = {
   '/accuracy/requested_error': 'chosen where accuracy is measured',
   '/assembly/input_angle_deg': 'turned in the picture',
@@ -385,7 +385,7 @@ const NOT_IN_THE_FORM = {
   ),
 };
 
-test('whatever a design may say has a field, or a reason why it has none, and there is no field of which the service knows nothing', async () => {
+test('fields match the API document, with listed exceptions', async () => {
   const page = await bed.open();
   const { schemas } = (await (await fetch(`${bed.server.origin}/openapi.json`)).json()).components;
   const known = new Set([...valuesOf(schemas, schemas.Design)].map(({ pointer }) => pointer));
@@ -399,7 +399,7 @@ test('whatever a design may say has a field, or a reason why it has none, and th
   assert.deepEqual(Object.keys(NOT_IN_THE_FORM).filter((pointer) => !known.has(pointer) || fields.has(pointer)), []);
 });
 
-test('every kind that the service has can be chosen, and has the fields that it has there', async () => {
+test('every kind can be chosen and has its fields', async () => {
   const page = await bed.open();
   const { schemas } = (await (await fetch(`${bed.server.origin}/openapi.json`)).json()).components;
   const variants = await page.evaluate(async () => {
@@ -417,7 +417,7 @@ test('every kind that the service has can be chosen, and has the fields that it 
     assert.deepEqual(Object.keys(variants[place]).toSorted(), Object.keys(mapping).toSorted());
     for (const [word, reference] of Object.entries(mapping)) {
       const own = [...valuesOf(schemas, { $ref: reference }, place)].map(({ pointer }) => pointer);
-      // On a race that does not rub nothing depends on its coefficient.
+      // The coefficient of a race without rubbing has no effect.
       const unshown = word === 'rolling' ? ['coefficient'] : [];
       const expected = own.filter((pointer) => ![propertyName, ...common, ...unshown].includes(pointer.slice(place.length + 1)));
       assert.deepEqual(variants[place][word].toSorted(), expected.toSorted(), `${union} ${word}`);
@@ -425,11 +425,11 @@ test('every kind that the service has can be chosen, and has the fields that it 
   }
 });
 
-test('modification is typed in the form: each number moves the answer, and virtual work, which it wants, is chosen with it', async () => {
+test('modification fields change the answer and choose virtual work', async () => {
   const page = await bed.open();
   await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
   await enter(page, '/parts/ring/clearance_um', 20);
-  // A turned part is lost motion alone: the wind-up has it, no force.
+  // A turned part gives only lost motion, which changes the wind-up but no force.
   await page.check(field('/sweep/wind_up'));
   await enter(page, '/modification/ring_equidistant_um', 4);
   let found = await answered(page);
@@ -452,12 +452,12 @@ test('modification is typed in the form: each number moves the answer, and virtu
   await settled(page);
   assert.ok(await page.isHidden(field('/modification/ring_tip_relief/power')));
   assert.deepEqual((await designOf(page)).modification, found.design.modification);
-  // A tooth that is too full is told in the service's words.
+  // An interference is reported in the service's words.
   await enter(page, '/modification/tooth_radius_um', -400);
   assert.match(await page.textContent('#impossible'), /too full|less than nothing|run into/i);
 });
 
-test('parts off the axis are typed in the form, and lists in the JSON are told', async () => {
+test('form has runouts and counts lists in JSON', async () => {
   const page = await bed.open();
   await page.evaluate(() => document.querySelectorAll('#form details').forEach((group) => (group.open = true)));
   await enter(page, '/parts/ring/clearance_um', 20);
@@ -470,7 +470,7 @@ test('parts off the axis are typed in the form, and lists in the JSON are told',
   assert.match(await page.locator('#form summary', { hasText: 'Runout' }).textContent(), /1 list in the JSON/);
 });
 
-test('where parts are made otherwise than nominal, the picture says that it is not of these, and leads to the drawings, which are', async () => {
+test('nominal picture says so and links to drawings', async () => {
   const page = await bed.open();
   const told = page.locator('#legend .nominal');
   assert.ok(await told.isHidden());
@@ -480,7 +480,7 @@ test('where parts are made otherwise than nominal, the picture says that it is n
   const made = { drive, load, modification: { ring_equidistant_um: 10 } };
   await setDocument(page, made);
   assert.equal(await told.textContent(), 'The picture is the nominal drive. The modification, of micrometres, is in the drawings, true to size.');
-  // As it says: the picture's outline is the unmodified one's, the drawing's is not.
+  // The picture's outline is that of the unmodified ring, unlike the drawing's.
   const ring = async (design) => (await bed.server.ask('/v1/drawings/ring', design)).bodies[0].holes[0];
   const outline = await page.getAttribute('#whole .part-ring', 'd');
   assert.notDeepEqual(await ring(made), await ring({ ...made, modification: {} }));

@@ -1,4 +1,4 @@
-// Links, files and names: what holds a design, and what is said where it does not.
+// Links, files and names: which of them hold a design, and messages for others.
 
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
@@ -15,7 +15,7 @@ async function linkOf(page) {
   return hash(page);
 }
 
-test('a link that was cut short says so, and its address stays until something is changed', async () => {
+test('truncated link reports it and keeps its address', async () => {
   let page = await bed.open();
   await enter(page, RADIUS, 4.5);
   const whole = await linkOf(page);
@@ -25,7 +25,7 @@ test('a link that was cut short says so, and its address stays until something i
     assert.match(await page.textContent('#notice'), /damaged or was cut short.*ready design is shown instead/);
     const { drive, load } = await bed.server.example('paper-5.1');
     assert.deepEqual(await designOf(page), { drive, load });
-    // Much longer than the address is put off after a change.
+    // Waits longer than the page delays its address after a change.
     await page.clock.fastForward(10_000);
     await settled(page);
     assert.equal(await hash(page), cut);
@@ -36,7 +36,7 @@ test('a link that was cut short says so, and its address stays until something i
   await page.waitForFunction((old) => location.hash !== old, '#desig');
 });
 
-test('of a link whose reference is cut short the design is shown', async () => {
+test('link with truncated reference shows its design', async () => {
   let page = await bed.open();
   await page.click('#keep');
   await enter(page, RADIUS, 4.5);
@@ -48,14 +48,14 @@ test('of a link whose reference is cut short the design is shown', async () => {
   assert.ok(await page.isHidden('#comparing'));
 });
 
-test('a link of version 0.1 opens', async () => {
+test('link of version 0.1 opens', async () => {
   const address = '#design=' + Buffer.from(JSON.stringify({ drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 56 }, teeth: { count: 28, radius_mm: 5, width_mm: 15 }, ring: { teeth: 26 } }, load: { input_torque_nm: 20 } })).toString('base64url');
   const page = await bed.open({ address });
   assert.equal((await designOf(page)).drive.teeth.radius_mm, 5);
   assert.ok(await page.isHidden('#notice'));
 });
 
-test('skip links move the focus and leave the design in the address', async () => {
+test('skip links move focus and keep the address', async () => {
   const page = await bed.open();
   const address = await linkOf(page);
   await page.evaluate(() => document.activeElement.blur());
@@ -67,7 +67,7 @@ test('skip links move the focus and leave the design in the address', async () =
   }
 });
 
-test('files of different designs have different names, and reloading adds nothing to them', async () => {
+test('different designs have different file names', async () => {
   const page = await bed.open();
   const names = new Set();
   const saved = async () => {
@@ -90,14 +90,14 @@ test('files of different designs have different names, and reloading adds nothin
     if (round === 0) await page.setInputFiles('#document-file', { name, mimeType: 'application/json', buffer });
     await settled(page);
   }
-  // The order of its fields makes no other design.
+  // The order of fields does not change the design.
   const design = await designOf(page);
   const before = (await saved()).name;
   await setDocument(page, Object.fromEntries(Object.entries(design).reverse()));
   assert.equal((await saved()).name.match(/[0-9a-f]{6}\.json$/)[0], before.match(/[0-9a-f]{6}\.json$/)[0]);
 });
 
-test('a file that holds no design is shown with the reason', async () => {
+test('file without design is shown with the reason', async () => {
   const page = await bed.open();
   await page.setInputFiles('#document-file', { name: 'broken.json', mimeType: 'application/json', buffer: Buffer.from('{ "drive": ') });
   await page.waitForSelector('#document-error:not([hidden])');
@@ -105,7 +105,7 @@ test('a file that holds no design is shown with the reason', async () => {
   assert.equal(await page.inputValue('#document-text'), '{ "drive": ');
 });
 
-test('STEP and CSV are downloaded as the API answers them', async () => {
+test('STEP and CSV files equal the API’s answers', async () => {
   const page = await bed.open();
   await enter(page, RADIUS, 4.5);
   const design = await designOf(page);
@@ -116,7 +116,7 @@ test('STEP and CSV are downloaded as the API answers them', async () => {
   ]) {
     const [download] = await Promise.all([page.waitForEvent('download'), pick(page, `[data-file="${file}"]`)]);
     assert.ok(download.suggestedFilename().endsWith(`-${file}`));
-    // A STEP file says when it was made, if it does.
+    // A STEP file may contain its time.
     const plain = (bytes) => bytes.toString().replace(/\d{4}-\d\d-\d\dT[\d:]+/g, '');
     assert.equal(plain(await readFile(await download.path())), plain(await bed.server.file(path, design, accept)), file);
   }

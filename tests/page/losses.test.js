@@ -16,7 +16,7 @@ async function pick(page, pointer, value) {
 
 const near = (found, expected, what) => assert.ok(Math.abs(found - expected) <= 1e-9 * Math.abs(expected), `${what}: ${found}, not ${expected}`);
 
-test('what case 5.1 loses on a plain cam, a race and a rolling one stands side by side, and a row applies its choice', async () => {
+test('losses of three bearings are compared and applied', async () => {
   const page = await bed.open();
   await choose(page, 'paper-5.1');
   await page.click('#compare-losses');
@@ -27,7 +27,7 @@ test('what case 5.1 loses on a plain cam, a race and a rolling one stands side b
   assert.ok(plain < 0.55 && race > 0.85 && rolling > race, JSON.stringify(rows));
   assert.match(rows[0].text, /locks itself/);
   assert.match(await page.textContent('#losses-table caption'), /taken for the comparison.*0\.05.*0\.002/);
-  // The design itself is as it was, until a row is chosen.
+  // The design does not change until a row is chosen.
   assert.equal((await designOf(page)).friction, undefined);
   assert.ok(await page.isHidden('#key-figures .tile:has-text("Efficiency")'));
   await page.click('#losses-table tr[data-kind="race"] button');
@@ -38,7 +38,7 @@ test('what case 5.1 loses on a plain cam, a race and a rolling one stands side b
   assert.equal(await page.getAttribute('#losses-table tr[data-kind="race"] button', 'aria-pressed'), 'true');
   await page.click('#compare-losses');
   await page.waitForFunction(() => document.querySelector('#losses-state').textContent === '');
-  // Whatever the efficiencies hang on.
+  // Efficiencies depend on these.
   const compared = await designOf(page);
   for (const change of [{ deviations: { ring_runout: { amount_um: 7, angle_deg: 0 } } }, { parts: { carrier: { outer_radius_mm: 65 } } }]) {
     await setDocument(page, { ...compared, ...change });
@@ -50,7 +50,7 @@ test('what case 5.1 loses on a plain cam, a race and a rolling one stands side b
   assert.match(await page.textContent('#losses-state'), /compare again/);
 });
 
-test('friction is chosen in the form, with all contacts or none', async () => {
+test('form sets friction at all contacts or none', async () => {
   const page = await bed.open();
   await open('Friction and wear');
   const before = await designOf(page);
@@ -70,7 +70,7 @@ test('friction is chosen in the form, with all contacts or none', async () => {
   assert.equal(await resultOf(page, 'Efficiency, ring fixed'), undefined);
 });
 
-test('results, plot, table and colours show what the service answers', async () => {
+test('results, plot, table and colours match the service', async () => {
   const page = await bed.open();
   const design = {
     ...(await bed.server.example('paper-5.1')),
@@ -91,7 +91,7 @@ test('results, plot, table and colours show what the service answers', async () 
   near(await resultOf(page, 'Pressure times velocity, carrier'), losses.pressure_velocity_mpa_m_per_s.carrier.value, 'p·v');
   near(await resultOf(page, 'Wear, wave generator'), 1000 * losses.wear_mm_per_hour.wave_generator.value, 'wear');
   assert.ok(await page.isVisible('#charts figure:has-text("Pressure times velocity")'));
-  // The curve has the service's own peak.
+  // The curve has the peak of the service's answer.
   const peaks = await page.evaluate(
     async ({ asked, sweep }) => {
       const [{ passOf }, { drawable }] = await Promise.all([import('/page/pass.js'), import('/page/states.js')]);
@@ -102,21 +102,21 @@ test('results, plot, table and colours show what the service answers', async () 
   );
   for (const [contact, peak] of Object.entries(peaks)) near(peak, losses.pressure_velocity_mpa_m_per_s[contact].value, contact);
   assert.ok(states.tooth.length > 0);
-  // Teeth are coloured by it where it is chosen.
+  // Teeth can be coloured by it.
   const colours = () => page.$$eval('#whole .tooth', (teeth) => teeth.map(({ style }) => style.fill));
   const before = await colours();
   await page.selectOption('#legend select', 'rubbing');
   await settled(page);
   assert.notDeepEqual(await colours(), before);
   assert.match(await page.textContent('#legend'), /MPa m\/s/);
-  // Without a speed there is none of it, and stress colours again.
+  // Without a speed it is missing, and stress gives the colours again.
   await enter(page, '/load/input_speed_rpm', '');
   assert.ok(await page.isHidden('#charts figure:has-text("Pressure times velocity")'));
   assert.match(await page.textContent('#legend'), /highest contact stress/);
   assert.equal(await resultOf(page, 'Power lost'), undefined);
 });
 
-test('a duty is typed as a load on each line', async () => {
+test('each line of a duty is one load', async () => {
   const page = await bed.open();
   await enter(page, '/load/input_speed_rpm', 900);
   await pick(page, '/load', 'duty');
@@ -143,7 +143,7 @@ test('a duty is typed as a load on each line', async () => {
   assert.deepEqual((await designOf(page)).load, { output_torque_nm: 140 });
 });
 
-test('an eccentric’s bearing shows its life', async () => {
+test('eccentric’s bearing shows its life', async () => {
   const page = await bed.open();
   await choose(page, 'eccentric-roller');
   await open('Friction and wear');
@@ -159,7 +159,7 @@ test('an eccentric’s bearing shows its life', async () => {
   assert.match(await page.textContent(notes(`${KIND}/bearing_load_rating_n`)), /ISO 281/);
 });
 
-test('a material fills in its numbers and names their source', async () => {
+test('material fills in its numbers and their source', async () => {
   const page = await bed.open();
   await open('Materials');
   await page.selectOption('select[aria-label="Ring: fill in a material"]', 'pom');
@@ -169,7 +169,7 @@ test('a material fills in its numbers and names their source', async () => {
   assert.match(await page.textContent('#form .filling:has(select[aria-label^="Ring"])'), /Engineering Plastics Handbook/);
 });
 
-test('the report of case 5.1 with friction and a speed names what it loses', async () => {
+test('report names losses of case 5.1', async () => {
   const page = await bed.open();
   const design = await bed.server.example('paper-5.1');
   await setDocument(page, { ...design, load: { ...design.load, input_speed_rpm: 1500 }, friction: { wave_generator: { kind: 'plain', coefficient: 0.03 }, ring: { coefficient: 0.05 }, carrier: { coefficient: 0.05 } } });

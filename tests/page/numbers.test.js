@@ -1,4 +1,4 @@
-// Numbers as people type them, counts that follow each other, fields of kinds.
+// Numbers as people type them, dependent counts, fields of kinds.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -7,7 +7,7 @@ import { choose, designOf, enter, field, notes, settled, testBed } from './harne
 const RADIUS = '/drive/teeth/radius_mm';
 const bed = testBed({ before, after, afterEach });
 
-test('a decimal comma is a comma, and where it could part thousands it is asked back', async () => {
+test('decimal comma is accepted unless ambiguous', async () => {
   const page = await bed.open();
   await enter(page, RADIUS, '5,5');
   assert.equal((await designOf(page)).drive.teeth.radius_mm, 5.5);
@@ -27,7 +27,7 @@ test('a decimal comma is a comma, and where it could part thousands it is asked 
   }
 });
 
-test('no number, however small or large, stops the page', async () => {
+test('page survives any number, small or large', async () => {
   const page = await bed.open();
   const fields = await page.$$eval('#form input[type=text]', (inputs) => inputs.filter((input) => input.checkVisibility() && !input.id.endsWith('-ratio')).map(({ id }) => id));
   assert.ok(fields.length >= 10);
@@ -43,7 +43,7 @@ test('no number, however small or large, stops the page', async () => {
   assert.equal(await page.inputValue(field(RADIUS)), '1.5');
 });
 
-test('an empty field says what it wants', async () => {
+test('empty field says what it needs', async () => {
   const page = await bed.open();
   for (const [pointer, wanted] of [
     [RADIUS, /Wanted here: the tooth radius, a number in mm, such as 5/],
@@ -57,7 +57,7 @@ test('an empty field says what it wants', async () => {
     await settled(page);
     assert.equal(await page.textContent(notes(pointer)), '');
   }
-  // What has a default can be emptied while it is typed anew.
+  // A field with a default may be empty during typing.
   await page.click('summary:has-text("Sweep and profile")');
   await page.fill(field('/sweep/samples'), '');
   await settled(page);
@@ -66,7 +66,7 @@ test('an empty field says what it wants', async () => {
   assert.equal(await page.inputValue(field('/sweep/samples')), '50');
 });
 
-test('another ratio takes the counts with it, without an error on the way', async () => {
+test('another ratio changes the counts without an error', async () => {
   const page = await bed.open();
   const refusals = [];
   page.on('response', (response) => response.status() === 422 && refusals.push(response.url()));
@@ -86,7 +86,7 @@ test('another ratio takes the counts with it, without an error on the way', asyn
   const { drive } = await designOf(page);
   assert.deepEqual([drive.teeth.count, drive.ring.teeth], [30, 32]);
   assert.equal((await bed.server.ask('/v1/geometry', await designOf(page))).transmission_ratio, -15);
-  // With every second slot filled it stays every second.
+  // With every second slot filled, this ratio is kept.
   await choose(page, 'paper-5.2');
   const before = (await bed.server.example('paper-5.2')).drive.teeth;
   assert.equal(before.count / before.installed, 2);
@@ -102,7 +102,7 @@ test('another ratio takes the counts with it, without an error on the way', asyn
   assert.match(await page.textContent(notes('/ratio')), /whole number, 2 or more/);
 });
 
-test('of what comes in kinds only the fields of the chosen kind are shown', async () => {
+test('only fields of the chosen kind are shown', async () => {
   const page = await bed.open();
   const found = await page.evaluate(async () => {
     const { Form } = await import('/page/form.js');

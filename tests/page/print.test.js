@@ -1,4 +1,4 @@
-// What comes out on paper.
+// Printing.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -48,7 +48,7 @@ test('plots are printed', async () => {
     const [, , , top] = first.view;
     for (const caption of ['Normal force, N', 'Contact stress, MPa']) {
       const { transform } = items.find(({ str }) => str.startsWith(caption));
-      // Below its caption, as wide as a plot.
+      // The plot is below its caption and has its width.
       const box = { x: Math.round(transform[4]), y: Math.round(top - transform[5]) + 4, width: 250, height: 130 };
       const count = await colouredPixels(first, box);
       assert.ok(count >= 200, `${caption}: ${count} coloured pixels`);
@@ -56,22 +56,22 @@ test('plots are printed', async () => {
   }
 });
 
-test('an impossible design prints its inputs and why it is impossible, and no number of another', async () => {
+test('impossible design prints inputs and reasons, no old numbers', async () => {
   const page = await bed.open();
   await enter(page, '/drive/wave_generator/semi_minor_mm', 60);
   const pages = await printed(page);
   assert.equal(pages.length, 1);
   const text = pages[0].join('\n');
-  assert.match(text, /Values that no design can have/);
+  assert.match(text, /The design is impossible/);
   assert.match(text, /Semi-major axis: .*must exceed/);
   assert.match(text, /Semi-minor axis\s+60/);
   assert.doesNotMatch(text, /1549|Largest stress|980/);
-  // Possible again, it prints all.
+  // A possible design prints everything again.
   await enter(page, '/drive/wave_generator/semi_minor_mm', 56);
   assert.match((await printed(page)).flat().join('\n'), /1549/);
 });
 
-test('no head stands alone at the foot of a page', async () => {
+test('no heading is alone at a page’s foot', async () => {
   const page = await bed.open();
   const heads = await page.evaluate(() => [...document.querySelectorAll('h2, h3, .group th')].map((element) => element.childNodes[0]?.textContent.trim()).filter(Boolean));
   assert.ok(heads.includes('Results') && heads.includes('Sizes and clearances'));
@@ -89,7 +89,7 @@ test('no head stands alone at the foot of a page', async () => {
   }
 });
 
-test('a comparison prints the inputs that differ', async () => {
+test('comparison prints the inputs that differ', async () => {
   const page = await bed.open();
   await page.click('#keep');
   await enter(page, '/load/input_torque_nm', 3);

@@ -1,4 +1,4 @@
-// What the page works out of studies' answers by itself, without a browser.
+// Calculations of the page from studies' answers, without a browser.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -11,8 +11,8 @@ const GOALS = [{ quantity: 'size', goal: 'min' }, { quantity: 'strength', goal: 
 const drive = (size, strength) => ({ design: { size, strength }, quantities: { size, strength } });
 const search = (front, more) => ({ front, limits: [], scan: { variants: 10, good: 1, impossible: 2, reasons: [] }, relaxations: [], ...more });
 
-test('of several searches the drives remain that no other beats, in the order of the first goal', () => {
-  // Pseudo-random, so that many are beaten across searches and a few are alike.
+test('several searches join to one sorted front', () => {
+  // Pseudo-random, with many dominated drives across searches and a few equal ones.
   let state = 7;
   const next = () => (state = (state * 48271) % 2147483647) % 40;
   const fronts = [0, 1, 2].map(() => Array.from({ length: 60 }, () => drive(next(), next())));
@@ -28,7 +28,7 @@ test('of several searches the drives remain that no other beats, in the order of
   assert.deepEqual(front.slice(0, 2).map(({ name }) => name), ['Drive 1', 'Drive 2']);
 });
 
-test('what fell to a limit is summed over searches, and close to it are those of the front within a hundredth', () => {
+test('failed counts add up, binding counts follow the front', () => {
   const limits = (fell) => [{ quantity: 'size', bound: 'max', limit: 100, fell, fell_alone: 1, binds: 0 }];
   const answers = [search([drive(99.5, 5), drive(50, 3)], { limits: limits(4) }), search([drive(40, 1)], { limits: limits(3) })];
   const found = together(answers.map((answer, index) => ({ label: String(index), answer })));
@@ -39,7 +39,7 @@ test('what fell to a limit is summed over searches, and close to it are those of
   assert.deepEqual([scan.variants, scan.impossible], [20, 4]);
 });
 
-test('of a search without drives the limit that has to give least stands first', () => {
+test('smallest relaxation comes first', () => {
   const limits = [{ quantity: 'size', bound: 'max', limit: 100, fell: 9, fell_alone: 0, binds: 0 }, { quantity: 'strength', bound: 'min', limit: 10, fell: 9, fell_alone: 0, binds: 0 }];
   const relaxations = [{ quantity: 'strength', bound: 'min', limit: 10, needed: 8 }, { quantity: 'size', bound: 'max', limit: 100, needed: 101.2 }];
   const { without: [miss] } = together([{ label: 'one', answer: search([], { limits, relaxations, nearest_miss: drive(101, 10) }) }]);
@@ -47,7 +47,7 @@ test('of a search without drives the limit that has to give least stands first',
   assert.deepEqual(miss.miss.missed.map(({ quantity }) => quantity), ['size']);
 });
 
-test('room for a drive is rounded to the far side of what it needs', () => {
+test('relaxed limit is rounded towards the looser side', () => {
   assert.equal(roomFor({ bound: 'max', needed: 65.37249 }), 65.38);
   assert.equal(roomFor({ bound: 'min', needed: 75.41247 }), 75.41);
   for (const needed of [1e-3, 0.123456, 9.9999, 152.0001, 123456.7]) {
@@ -56,7 +56,7 @@ test('room for a drive is rounded to the far side of what it needs', () => {
   }
 });
 
-test('a curve that is thinned keeps its extremes and its gaps', () => {
+test('thinned curve keeps its extremes and gaps', () => {
   const values = Float64Array.from({ length: 10001 }, (_, index) => Math.sin(index / 500));
   values[4321] = 9;
   values[1234] = -9;
@@ -68,14 +68,14 @@ test('a curve that is thinned keeps its extremes and its gaps', () => {
   assert.deepEqual(thinned([1, 2, 3], 2400), [0, 1, 2]);
 });
 
-test('a map’s rows are put where they belong in its grid', () => {
+test('rows of a map go to their grid cells', () => {
   const answer = { study: 'map', variants: 4, over: [], is_complete: false, possible: { variant: [0, 3], quantities: { size: [5, 6] } }, impossible: { variant: [1], reason: [0] }, reasons: [{}] };
   const { quantities, reason } = drawableStudy(answer);
   assert.deepEqual([...quantities.size], [5, NaN, NaN, 6]);
   assert.deepEqual([...reason], [0, 1, 0, 0]);
 });
 
-test('each kind of drive is a search of its own, with as many slots as its lobes and the ratio want', () => {
+test('each kind has own search with fitting slots', () => {
   const requirements = { find: { ...FIRST.find, wave_generators: { eccentric: true, harmonic_more: true }, lobes: 3, ratio: 19.5, ratio_max: 20.5 } };
   const [one, three] = searchesOf(requirements);
   assert.equal(one.question.base.drive.teeth.count, 20, 'one lobe has a whole ratio');

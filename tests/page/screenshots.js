@@ -1,4 +1,4 @@
-// The pictures in docs/screenshots: both of the paper's cases in light, dark and narrow, case 5.1 made to undercut, a search and a map.
+// The pictures in docs/screenshots: the first drive with its ring cut too deep, a tooth radius that undercuts, a search and a map.
 // Of all of them, or of those that are named: tests/page/run screenshots [NAME...]
 
 import { mkdir } from 'node:fs/promises';
@@ -6,7 +6,6 @@ import { Server, choose, enter, launch, notes, open, settled } from './harness.j
 
 const FOLDER = new URL('../../docs/screenshots/', import.meta.url).pathname;
 const WIDE = { viewport: { width: 1366, height: 1120 } };
-const NARROW = { viewport: { width: 400, height: 1500 } };
 
 /** A study may take minutes on a machine that has much else to do. */
 const PATIENCE = { timeout: 900_000 };
@@ -32,21 +31,18 @@ async function take(name, options, prepare) {
   await page.context().close();
 }
 
-for (const example of ['paper-5.1', 'paper-5.2']) {
-  const prepare = async (page) => {
-    await choose(page, example);
-    await showPeak(page);
-    await page.evaluate(() => scrollTo(0, 0));
-  };
-  await take(`${example}-light`, WIDE, prepare);
-  await take(`${example}-dark`, { ...WIDE, colorScheme: 'dark' }, prepare);
-  await take(`${example}-narrow`, NARROW, async (page) => {
-    await prepare(page);
-    await page.evaluate(() => document.querySelector('main').scrollIntoView());
+await take('first-drive', { viewport: { ...WIDE.viewport, height: 1000 }, example: null }, async (page) => {
+  await page.click('#intro-hide');
+  await page.click('#keep');
+  await enter(page, '/parts/ring/clearance_um', 10);
+  await showPeak(page);
+  await page.evaluate(() => {
+    scrollTo(0, 0);
+    document.querySelector('#form').scrollTop += 450;
   });
-}
+});
 
-await take('undercut', { viewport: { ...WIDE.viewport, height: 1000 } }, async (page) => {
+await take('undercut', { viewport: { ...WIDE.viewport, height: 1000 }, example: null }, async (page) => {
   await page.click('#keep');
   await enter(page, '/drive/teeth/radius_mm', 7);
   await page.locator(`${notes('/drive/teeth/radius_mm')} .finding`).first().click();

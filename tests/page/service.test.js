@@ -1,4 +1,4 @@
-// A service that hangs, one that wants a key, and one that has very much to say.
+// A service that hangs, one that needs a key, and very large answers.
 
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
@@ -9,10 +9,10 @@ import { after, afterEach, before, test } from 'node:test';
 import { BINARY, enter, field, open, pick, resultOf, Server, settled, testBed } from './harness.js';
 
 const RADIUS = '/drive/teeth/radius_mm';
-// A machine that has much else to do is slow, not too slow.
+// A busy machine needs longer.
 const bed = testBed({ before, after, afterEach }, ['--deadline-ms', '60000']);
 
-test('of a service that hangs the page tells, and goes on when it answers', async () => {
+test('page reports a hanging service and recovers', async () => {
   const page = await bed.open();
   page.expectsOutage = true;
   bed.server.process.kill('SIGSTOP');
@@ -31,7 +31,7 @@ test('of a service that hangs the page tells, and goes on when it answers', asyn
   assert.equal(await resultOf(page, 'Ring tip radius'), (await bed.server.ask('/v1/geometry', { ...(await bed.server.example('paper-5.1')), drive: { ...(await bed.server.example('paper-5.1')).drive, teeth: { count: 28, radius_mm: 4.5, width_mm: 15 } } })).ring.tip_radius_mm);
 });
 
-test('where a key is wanted the page asks for it, keeps it in memory alone and goes on', async () => {
+test('page asks for a key, keeps it in memory', async () => {
   const made = execFileSync(BINARY, ['new-key', 'a team'], { encoding: 'utf8' });
   const [key] = made.match(/tw_[0-9a-f]+/);
   const [line] = made.match(/[0-9a-f]{64} a team/);
@@ -55,7 +55,7 @@ test('where a key is wanted the page asks for it, keeps it in memory alone and g
     assert.ok(await page.isHidden('#login'));
     await enter(page, RADIUS, 4.5);
     assert.match(await page.textContent('#key-figures'), /Largest force\d/);
-    // Files are asked for with it too.
+    // Requests for files have the key too.
     const [download] = await Promise.all([page.waitForEvent('download'), pick(page, '[data-file="ring.dxf"]')]);
     assert.match(download.suggestedFilename(), /ring\.dxf$/);
     const kept = await page.evaluate(() => JSON.stringify([localStorage, sessionStorage, document.cookie, location.href]));
@@ -68,7 +68,7 @@ test('where a key is wanted the page asks for it, keeps it in memory alone and g
   }
 });
 
-test('of very many input angles those are drawn that can be told apart, and the table has them all', async () => {
+test('many input angles are thinned in drawing only', async () => {
   const page = await bed.open();
   const design = { ...(await bed.server.example('paper-5.2')), model: { compatibility: 'virtual_work' }, parts: { ring: { clearance_um: 1 } }, sweep: { samples: 4000 } };
   const found = await page.evaluate(async (asked) => {
@@ -102,7 +102,7 @@ test('of very many input angles those are drawn that can be told apart, and the 
   assert.ok(found.areAll && found.hasPeaks && found.rest);
   assert.deepEqual(found.carrying, found.wanted);
   assert.ok(found.jumps[0] > 0 && found.frames > 500);
-  // A large answer is read beside the page: no task of it lasts as long as reading and drawing all of it would.
+  // A worker reads a large answer, so no task of the page takes as long as reading and drawing it.
   await page.evaluate(() => {
     window.longest = 0;
     new PerformanceObserver((list) => list.getEntries().forEach(({ duration }) => (window.longest = Math.max(window.longest, duration)))).observe({ type: 'longtask' });
@@ -119,7 +119,7 @@ test('of very many input angles those are drawn that can be told apart, and the 
   console.log(`longest task with 6000 samples: ${await page.evaluate(() => window.longest)} ms`);
 });
 
-test('a page opened at a service that is silent says so, and begins when it answers', async () => {
+test('page opened at a silent service starts later', async () => {
   const server = await Server.start();
   const page = await open(bed.browser, server);
   page.expectsOutage = true;
@@ -137,17 +137,17 @@ test('a page opened at a service that is silent says so, and begins when it answ
   }
 });
 
-test('documents that came are kept while others are asked for again, so a page of many begins however many fail', async () => {
+test('page retries only the documents that failed', async () => {
   const page = await bed.open();
   page.expectsOutage = true;
   let asked = 0;
-  // Among those that a page begins with there are always some of these.
+  // The first requests of a page include some of these.
   await page.route(/\/v1\/(quantities|examples)/, (route) => ((asked += 1) % 4 === 0 ? route.abort() : route.continue()));
   await page.reload();
   await settled(page);
   const examples = await page.locator('[data-example]').count();
   assert.ok(examples > 4);
-  // Each document that failed was asked for once more, as often as it failed, and no other one.
+  // The page repeated exactly the failed requests, once for each failure.
   const { examples: served } = await (await fetch(`${bed.server.origin}/v1/examples`)).json();
   assert.equal(asked - Math.floor(asked / 4), served.length + 2);
 });

@@ -1,4 +1,4 @@
-// Nothing moves under the hand, everything can be reached and hit.
+// Layout is stable, and every control can be reached and hit.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -27,7 +27,7 @@ async function dragged(page, pointer, shares) {
   for (const share of shares) {
     const before = await page.inputValue(field(pointer));
     await page.mouse.move(box.x + box.width * share, y);
-    // A browser hands pointer events on by the frame.
+    // A browser delivers pointer events once a frame.
     await page.waitForFunction(([selector, old]) => document.querySelector(selector).value !== old, [field(pointer), before]);
     await settled(page);
     all.push(await places(page));
@@ -36,9 +36,9 @@ async function dragged(page, pointer, shares) {
 }
 
 for (const [name, viewport] of Object.entries({ wide: { width: 1366, height: 900 }, tablet: { width: 820, height: 1180 } })) {
-  test(`nothing moves while a held slider passes limits: ${name}`, async () => {
+  test(`nothing moves while slider passes limits: ${name}`, async () => {
     const page = await bed.open({ viewport });
-    // Past the undercut, and past the smallest semi-minor axis that a cam can have.
+    // Beyond undercut, and beyond the least semi-minor axis of a cam.
     const all = await dragged(page, RADIUS, [0.75, 0.95, 0.5]);
     for (const each of all) assert.deepEqual(each, all[0]);
     await page.mouse.move(1, 1);
@@ -51,7 +51,7 @@ for (const [name, viewport] of Object.entries({ wide: { width: 1366, height: 900
   });
 }
 
-test('what a held slider passes is told at once in the line at the top, and at the field when it is let go', async () => {
+test('held slider reports findings on top, then at field', async () => {
   const page = await bed.open();
   await dragged(page, RADIUS, [0.75]);
   assert.match(await page.textContent('#status-findings'), /Undercut ring tips/);
@@ -62,7 +62,7 @@ test('what a held slider passes is told at once in the line at the top, and at t
   assert.match(await page.textContent('#findings'), /Undercut ring tips/);
 });
 
-test('the table of results waits while a slider is held, unless it is seen', async () => {
+test('hidden result table waits while slider is held', async () => {
   const page = await bed.open();
   const gap = () => resultOf(page, 'Least gap between teeth');
   const answered = async () => {
@@ -85,7 +85,7 @@ test('the table of results waits while a slider is held, unless it is seen', asy
   assert.equal(await gap(), await answered());
 });
 
-test('an impossible design is told in a line of its own height, with all reasons under it on demand', async () => {
+test('impossible design takes one line, reasons on demand', async () => {
   const page = await bed.open();
   const before = await places(page);
   await enter(page, SEMI_MINOR, 60);
@@ -96,7 +96,7 @@ test('an impossible design is told in a line of its own height, with all reasons
   assert.equal(await page.evaluate(() => document.activeElement.id), 'field-drive-wave_generator-semi_major_mm');
 });
 
-test('a field that has the focus stays where it is while others above it are told of', async () => {
+test('focused field stays while notes above it change', async () => {
   const page = await bed.open();
   await page.focus(field('/drive/ring/teeth'));
   const top = () => page.$eval(field('/drive/ring/teeth'), (input) => input.getBoundingClientRect().top);
@@ -117,7 +117,7 @@ test('Play is reached within a dozen tab stops', async () => {
   assert.ok(stops <= 12, `${stops} stops`);
 });
 
-test('the tools are one stop, and arrows move among them', async () => {
+test('tools are one tab stop with arrow keys', async () => {
   const page = await bed.open();
   const focused = () => page.evaluate(() => document.activeElement.textContent);
   await page.focus('#keep');
@@ -132,11 +132,11 @@ test('the tools are one stop, and arrows move among them', async () => {
   assert.equal(await page.locator('#tools [tabindex="0"]').count(), 1);
 });
 
-test('at four sizes no key figure’s name and no empty field’s word is cut', async () => {
+test('names and placeholders are never cut', async () => {
   const design = await bed.server.example('paper-5.1');
   design.model = { compatibility: 'virtual_work', stiffness: { law: 'johnson' } };
   design.friction = { wave_generator: { kind: 'plain', coefficient: 0.05 }, ring: { coefficient: 0.05 }, carrier: { coefficient: 0.05 } };
-  // A natural tip radius that takes three digits and a point.
+  // A natural tip radius with three digits and a point.
   const roller = { ...(await bed.server.example('eccentric-roller')), friction: design.friction };
   const page = await bed.open();
   for (const [shown, width, height] of [design, roller].flatMap((shown) => [[shown, 320, 640], [shown, 768, 1024], [shown, 1366, 900], [shown, 1920, 1080]])) {
@@ -162,7 +162,7 @@ test('at four sizes no key figure’s name and no empty field’s word is cut', 
   }
 });
 
-test('on a small screen the tools take one row, and views and tools one on a wide screen', async () => {
+test('tools take one row on small and wide screens', async () => {
   const heightOf = (selector) => bed.page.$eval(selector, (element) => element.getBoundingClientRect().height);
   await bed.open({ viewport: { width: 390, height: 844 } });
   assert.ok((await heightOf('#tools')) < 45);
@@ -173,7 +173,7 @@ test('on a small screen the tools take one row, and views and tools one on a wid
   assert.ok(Math.abs(views.y + views.height / 2 - tools.y - tools.height / 2) < 12, `${views.y}, ${tools.y}`);
 });
 
-test('at 320 px nothing is wider than the screen, and every target is 24 px', async () => {
+test('page fits 320 px with targets of 24 px', async () => {
   const page = await bed.open({ viewport: { width: 320, height: 640 } });
   await page.click('#keep');
   await setDocument(page, { ...(await bed.server.example('paper-5.2')), sweep: { wind_up: true }, model: { compatibility: 'virtual_work', stiffness: { law: 'fixed', wave_generator_n_per_mm: 5e5, ring_n_per_mm: 5e5, carrier_n_per_mm: 5e5 } }, parts: { ring: { clearance_um: 1 } }, load: { input_torque_nm: 3, allowable_stress_mpa: 1500 } });

@@ -55,7 +55,7 @@ async function onlyDeviates(page, ...labels) {
   for (const label of labels) await page.locator('#tolerance .deviation', { hasText: label }).locator('select').selectOption('uniform');
 }
 
-test('every view is reached from the head within a dozen tab stops, and arrow keys go from one to the next', async () => {
+test('tab and arrow keys reach every view', async () => {
   const page = await bed.open();
   const focused = () => page.evaluate(() => document.activeElement.closest('#views button')?.dataset.view);
   let stops = 0;
@@ -78,7 +78,7 @@ test('every view is reached from the head within a dozen tab stops, and arrow ke
   assert.ok(await page.isVisible('#whole'));
 });
 
-test('at 320 px no view is wider than the screen, and none has a fault of accessibility, light or dark', async () => {
+test('every view fits 320 px and is accessible', async () => {
   for (const options of [{ viewport: { width: 320, height: 900 }, colorScheme: 'dark' }, {}]) {
     await bed.page?.context().close();
     const page = await bed.open(options);
@@ -100,7 +100,7 @@ test('at 320 px no view is wider than the screen, and none has a fault of access
   }
 });
 
-test('at 320 px the axes of a study are named in full and have two numbers each, and a choice stands beside its mark', async () => {
+test('study axes at 320 px keep names and numbers', async () => {
   const page = await bed.open({ viewport: { width: 320, height: 900 } });
   await show(page, 'tolerance');
   await onlyDeviates(page, 'Width of all teeth');
@@ -124,7 +124,7 @@ test('at 320 px the axes of a study are named in full and have two numbers each,
   assert.ok(rows.length > 8, `${rows.length}`);
 });
 
-test('a curve’s numbers are those of the sweep, and can be taken into the design', async () => {
+test('curve matches the sweep and applies to the design', async () => {
   const page = await bed.open();
   await show(page, 'explore');
   await done(page, 'explore', '.curve');
@@ -144,7 +144,7 @@ test('a curve’s numbers are those of the sweep, and can be taken into the desi
   assert.equal((await designOf(page)).drive.teeth.radius_mm, 5);
 });
 
-test('where no drive is possible a curve has a gap, with its reason', async () => {
+test('curve has a gap with reason for impossible drives', async () => {
   const page = await bed.open();
   await show(page, 'explore');
   await done(page, 'explore', '.curve');
@@ -156,7 +156,7 @@ test('where no drive is possible a curve has a gap, with its reason', async () =
   assert.ok(await page.isDisabled('#explore button:has-text("Take into the design")'));
 });
 
-test('a map takes two numbers at once into the design', async () => {
+test('map point applies two numbers to the design', async () => {
   const page = await bed.open();
   await show(page, 'explore');
   await over(page, 2, SEMI_MAJOR);
@@ -174,7 +174,7 @@ test('a map takes two numbers at once into the design', async () => {
   assert.ok(Math.abs(largest - shown) <= 5e-5 * largest);
 });
 
-test('slots vary with the ring’s teeth that belong to them', async () => {
+test('slots vary together with ring teeth', async () => {
   const page = await bed.open();
   await enter(page, '/drive/teeth/installed', '');
   await show(page, 'explore');
@@ -188,7 +188,7 @@ test('slots vary with the ring’s teeth that belong to them', async () => {
   assert.deepEqual([teeth.count, ring.teeth], [20, 18]);
 });
 
-test('a map of a million variants is read beside the page and drawn with as many cells as a screen has', async () => {
+test('map of a million variants is thinned in drawing', async () => {
   const page = await bed.open();
   const steps = 1000;
   const values = Array.from({ length: steps }, (_, index) => 1 + index);
@@ -224,7 +224,7 @@ test('a map of a million variants is read beside the page and drawn with as many
   assert.deepEqual(size, [334, 334]);
 });
 
-test('from ratio, torque and space follow drives that keep every limit, and one opens as design', async () => {
+test('ratio, torque and space give drives to open', async () => {
   const page = await bed.open();
   await find(page, { ratio: 20, output_torque_nm: 200, outer_diameter_mm: 120 });
   assert.match(await page.textContent('#find .headline'), /\d+ drives meet all limits \(Pareto front\)/);
@@ -244,11 +244,11 @@ test('from ratio, torque and space follow drives that keep every limit, and one 
   assert.ok(2 * 1.2 * geometry.ring.root_radius_mm <= 120);
   assert.ok(sweep.torque_capacity.output_torque_nm >= 200);
   assert.equal(sweep.load.output_torque_nm, 200);
-  // What a finding warns of was among the limits.
+  // The limits cover all warnings.
   assert.deepEqual(geometry.findings.filter(({ severity }) => severity === 'warning'), []);
 });
 
-test('the table of drives has a million as a million', async () => {
+test('table of drives keeps thousands readable', async () => {
   const page = await bed.open();
   await show(page, 'find');
   await page.check(field('/find/goals/stiff'));
@@ -266,7 +266,7 @@ test('the table of drives has a million as a million', async () => {
   assert.ok(Math.abs(stiffness[0] / least - 1) < 0.01, `${stiffness[0]}, not ${least}`);
 });
 
-test('the smallest drive for what the page begins with is one to build: no finding speaks of it, and every drawing of it can be had', async () => {
+test('smallest drive has no findings and all drawings', async () => {
   const page = await bed.open();
   await find(page);
   assert.match(await page.textContent('#find .drive-card h3'), /^Drive 1$/);
@@ -280,7 +280,7 @@ test('the smallest drive for what the page begins with is one to build: no findi
   assert.ok(sweep.series_compliance_estimates.find(({ backing }) => backing === 'finger_at_both_ends').share <= 0.2);
   assert.ok(sweep.torque_capacity.output_torque_nm >= 200);
   for (const part of ['assembly', 'ring', 'wave-generator', 'carrier', 'tooth']) {
-    // Of each part one, since Chromium drops what a page downloads beyond ten files a second.
+    // One file for each part, since Chromium drops downloads beyond ten a second.
     const [download] = await Promise.all([page.waitForEvent('download'), pick(page, `[data-file="${part}.dxf"]`)]);
     assert.ok((await readFile(await download.path())).length > 500, part);
     for (const [accept, beginning] of [['model/step', 'ISO-10303-21;'], ['image/svg+xml', '<svg ']]) {
@@ -290,7 +290,7 @@ test('the smallest drive for what the page begins with is one to build: no findi
   }
 });
 
-test('what is known of a drive fills the room beside its picture, and follows it on a narrow screen', async () => {
+test('figures of a drive are beside or below it', async () => {
   const page = await bed.open();
   await find(page);
   const box = (selector) => page.locator(`#find ${selector}`).boundingBox();
@@ -302,7 +302,7 @@ test('what is known of a drive fills the room beside its picture, and follows it
   assert.ok(below.y >= narrow.y + narrow.height);
 });
 
-test('the reasons why others fell are counted', async () => {
+test('reasons of failed drives are counted', async () => {
   const page = await bed.open();
   await find(page);
   const reasons = page.locator('#find [aria-labelledby="reasons-title"]');
@@ -312,7 +312,7 @@ test('the reasons why others fell are counted', async () => {
   assert.match(await reasons.locator('details').first().textContent(), /such as: /);
 });
 
-test('two drives are compared at one scale, and open as design and reference', async () => {
+test('two drives are compared at one scale', async () => {
   const page = await bed.open();
   await find(page);
   const checks = page.locator('#find .drives-scroll input[type=checkbox]');
@@ -320,7 +320,7 @@ test('two drives are compared at one scale, and open as design and reference', a
   assert.match(await page.textContent('#comparison-title'), /Drive 1, and…/);
   await checks.nth(4).check();
   assert.equal(await page.textContent('#comparison-title'), 'Drive 1 and drive 5');
-  // Pictures are drawn when they are seen.
+  // Pictures are drawn when they become visible.
   await page.locator('#find .pair').scrollIntoViewIfNeeded();
   const viewBoxes = () => page.$$eval('#find .pair svg', (pictures) => pictures.map((picture) => picture.getAttribute('viewBox')));
   await page.waitForFunction(() => document.querySelectorAll('#find .pair svg').length === 2);
@@ -338,7 +338,7 @@ const lengths = ({ drive: { wave_generator: wave, teeth } }) => [wave.radius_mm,
 const isRound = (value) => Number(value.toFixed(2)) === value;
 const kept = (page) => page.evaluate(() => JSON.parse(sessionStorage.getItem('found')).found);
 
-test('found drives have rounded lengths and meet all limits', async () => {
+test('found drives have rounded lengths and meet limits', async () => {
   const page = await bed.open();
   await find(page);
   const { front } = await kept(page);
@@ -361,7 +361,7 @@ test('standard diameters are a choice', async () => {
   for (const { design } of front) assert.ok((4 * design.drive.teeth.radius_mm) % 1 === 0, `diameter ${2 * design.drive.teeth.radius_mm} mm`);
 });
 
-test('found drives survive a reload, Back knows the view', async () => {
+test('found drives survive reload and Back', async () => {
   const page = await bed.open();
   await find(page);
   const before = await page.textContent('#find .drives');
@@ -379,7 +379,7 @@ test('found drives survive a reload, Back knows the view', async () => {
   await page.waitForSelector('#whole', { state: 'visible' });
 });
 
-test('Find drives is in sight, and says what comes', async () => {
+test('Find drives is visible and explains its result', async () => {
   for (const viewport of [{ width: 1440, height: 900 }, { width: 768, height: 1024 }, { width: 390, height: 844 }]) {
     await bed.page?.context().close();
     const page = await bed.open({ viewport });
@@ -390,7 +390,7 @@ test('Find drives is in sight, and says what comes', async () => {
   }
 });
 
-test('a value beyond its limit never looks like it', async () => {
+test('value beyond its limit never looks equal', async () => {
   const page = await bed.open();
   const shown = await page.evaluate(async () => {
     const { apart } = await import('/page/reasons.js');
@@ -415,7 +415,7 @@ test('tolerances start from grades of each part', async () => {
   assert.deepEqual(question.base.modification, { tooth_radius_um: 2.25, slot_wall_um: 3.75, ring_equidistant_um: 3.75 }, 'the middles of the zones');
   assert.deepEqual(question.deviations.slot_wall_um, { distribution: 'normal', limit: 3.75, sigma: 1.25 });
   await page.click('#tolerance .study-progress button');
-  // Parts within such zones can always be put together.
+  // Parts within these zones always fit together.
   let study = await bed.server.ask('/v1/studies', { ...question, samples: 10, quantities: ['peak_stress_mpa'] });
   while (study.state === 'running') study = await (await fetch(`${bed.server.origin}/v1/studies/${study.id}`)).json();
   const { interference, impossible } = await (await fetch(bed.server.origin + study.result_href)).json();
@@ -432,7 +432,7 @@ test('labels of an axis differ', async () => {
   for (const labels of texts) assert.ok(labels.length >= 2 && new Set(labels).size === labels.length, labels.join(', '));
 });
 
-test('where nothing is possible the least change that would do is offered, and does', async () => {
+test('impossible search offers a smallest sufficient change', async () => {
   const page = await bed.open();
   await find(page, { outer_diameter_mm: 60 });
   assert.equal(await page.textContent('#find .headline'), 'No drive meets all limits.');
@@ -443,7 +443,7 @@ test('where nothing is possible the least change that would do is offered, and d
   assert.ok(Number(await page.inputValue(field('/find/outer_diameter_mm'))) > 60);
 });
 
-test('a search can be cancelled, and says so', async () => {
+test('cancelled search says so', async () => {
   const page = await bed.open();
   await show(page, 'find');
   await page.selectOption(field('/find/effort'), 'thorough');
@@ -458,7 +458,7 @@ test('a search can be cancelled, and says so', async () => {
   assert.equal(state, 'cancelled');
 });
 
-test('requirements that are missing or cannot be are told at their fields, and nothing runs', async () => {
+test('bad requirements are reported at their fields', async () => {
   const page = await bed.open();
   await show(page, 'find');
   let asked = 0;
@@ -474,7 +474,7 @@ test('requirements that are missing or cannot be are told at their fields, and n
   assert.equal(asked, 0);
 });
 
-test('sensitivity ranks the inputs by what they really do', async () => {
+test('sensitivity ranks inputs by their effect', async () => {
   const page = await bed.open();
   await show(page, 'sensitivity');
   await done(page, 'sensitivity', 'tbody tr');
@@ -491,7 +491,7 @@ test('sensitivity ranks the inputs by what they really do', async () => {
   for (const [cell, value] of [[2, await largest(58 * 0.99)], [3, await largest(58 * 1.01)]]) {
     assert.equal(numberIn(rows[0][cell]), Number(Math.abs(value - base).toPrecision(3)), 'as a sweep of its own');
   }
-  // Moved by its tolerance the axis does less than what else moves by 1 %.
+  // Moved by its tolerance, the axis has less effect than other inputs moved by 1 %.
   await page.locator('#sensitivity tbody tr').first().locator('input').fill('0.0001');
   await page.keyboard.press('Tab');
   await page.waitForFunction(() => !document.querySelector('#sensitivity tbody th').textContent.startsWith('Semi-major'));
@@ -499,14 +499,14 @@ test('sensitivity ranks the inputs by what they really do', async () => {
   await page.waitForFunction(() => document.querySelector('#sensitivity tbody th').textContent.startsWith('Semi-major'));
 });
 
-test('tolerances tell spread, yield and what matters most', async () => {
+test('tolerances report spread, yield and main contributor', async () => {
   const page = await bed.open();
   await show(page, 'tolerance');
   await onlyDeviates(page, 'Radius of all teeth', 'Width of all teeth');
   await page.locator('#tolerance .ask-row').first().locator('select').nth(1).selectOption('1000');
   await page.locator('#tolerance .ask-row').first().locator('select').first().selectOption('peak_stress_mpa');
   await page.waitForFunction(() => /Peak stress.*Width of all teeth/s.test(document.querySelector('#tolerance .tolerance-tables').textContent));
-  // Half the square root of a width: 15 mm ± 0.05 mm moves 980.44 MPa by a third of a percent over its half, evenly.
+  // Stress goes as the root of the width: 15 mm ± 0.05 mm moves 980.44 MPa uniformly by half of a third of a percent.
   const quantile = async (share) => numberIn(await page.locator('#tolerance tr', { hasText: new RegExp(`^${share}.%`) }).locator('td').first().textContent());
   const median = await quantile(50);
   assert.ok(Math.abs(median - 980.44) < 0.3, String(median));
@@ -520,7 +520,7 @@ test('tolerances tell spread, yield and what matters most', async () => {
   assert.ok(good > 40 && good < 60, `${good} % lie below the middle`);
 });
 
-test('drives that differ by a thousandth are told apart, however small the quantity is', async () => {
+test('quantiles a thousandth apart are displayed differently', async () => {
   const page = await bed.open();
   await choose(page, 'harmonic-three-lobes');
   await show(page, 'tolerance');
@@ -534,7 +534,7 @@ test('drives that differ by a thousandth are told apart, however small the quant
   assert.equal(new Set(values).size, values.length, values.join(', '));
 });
 
-test('deviations of single parts want virtual work and gaps, and say so', async () => {
+test('deviations say they need virtual work and gaps', async () => {
   const page = await bed.open();
   await show(page, 'tolerance');
   await onlyDeviates(page, 'Depth of each ring space');
@@ -545,7 +545,7 @@ test('deviations of single parts want virtual work and gaps, and say so', async 
   await page.waitForFunction(() => /100 of 100 cannot be put together; clearances give their parts room/.test(document.querySelector('#tolerance .headline').textContent));
 });
 
-test('a study asks anew when the design changes', async () => {
+test('changed design repeats its study', async () => {
   const page = await bed.open();
   await show(page, 'sensitivity');
   await done(page, 'sensitivity', 'tbody tr');
@@ -554,7 +554,7 @@ test('a study asks anew when the design changes', async () => {
   await page.waitForFunction(() => /1026/.test(document.querySelector('#sensitivity .headline').textContent));
 });
 
-test('printed is the design’s report, whatever view is shown', async () => {
+test('every view prints the design’s report', async () => {
   const page = await bed.open();
   await show(page, 'find');
   await page.emulateMedia({ media: 'print' });

@@ -1,4 +1,4 @@
-// What the drawing and the plots show between the service's states is what the service answers there.
+// Values between the service's states, as drawn and plotted, match the service's answers there.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -7,7 +7,7 @@ import { choose, field, settled, testBed } from './harness.js';
 const bed = testBed({ before, after, afterEach });
 const EXAMPLES = ['paper-5.1', 'paper-5.2', 'ring-with-more-teeth'];
 
-test('between two states the loads are those that the service finds there', async () => {
+test('loads between states match the service', async () => {
   const page = await bed.open();
   for (const name of EXAMPLES) {
     const worst = await page.evaluate(async (example) => {
@@ -38,13 +38,13 @@ test('between two states the loads are those that the service finds there', asyn
       return { ...off, missing };
     }, name);
     assert.deepEqual(worst.missing, [], name);
-    // The step of 50 samples, held at a jump, is all that they are off by.
+    // The only error is a step of 50 samples, held at a jump.
     assert.ok(worst.force < 0.012, `${name}: forces off by ${worst.force}`);
     assert.ok(worst.stress < 0.012, `${name}: stresses off by ${worst.stress}`);
   }
 });
 
-test('where items deviate each tooth carries, in whatever turn, what the service finds for it', async () => {
+test('deviating teeth match the service in every turn', async () => {
   const page = await bed.open();
   const found = await page.evaluate(async () => {
     const { Motion } = await import('/page/motion.js');
@@ -71,7 +71,7 @@ test('where items deviate each tooth carries, in whatever turn, what the service
         const periods = Math.round(sweep.sweep_period_deg / sweep.period_deg);
         let [worst, teeth] = [0, 0];
         for (const on of [1, periods - 1, periods, periods + 3, 2 * periods + 1, -1, -periods - 2]) {
-          // So many periods on each tooth stands where the one so many slots before it stood: as if all items had been told by other numbers.
+          // After n periods each tooth has the place of the tooth n slots before, as if items were renumbered.
           const named = Object.entries(deviations).map(([name, list]) => [name, name.startsWith('wave') ? list : turned(list, name.startsWith('ring') ? (on * count) / installed : on)]);
           const { states } = await ask('/v1/sweep', { ...design, deviations: Object.fromEntries(named) });
           const angle = states.input_angle_deg.find((deg) => deg > 0);
@@ -83,7 +83,7 @@ test('where items deviate each tooth carries, in whatever turn, what the service
             teeth += 1;
           });
         }
-        // The plots show the largest of all teeth.
+        // The plots show the largest load of all teeth.
         const { force, stress } = passOf(design, sweep);
         const short = ['wave_generator', 'ring', 'carrier'].map((key) => Math.max(sweep.peaks[key].force_n.value - Math.max(...force[key]), sweep.peaks[key].stress_mpa.value - Math.max(...stress[key])));
         report.push({ worst, teeth, short: Math.max(...short) });
@@ -98,7 +98,7 @@ test('where items deviate each tooth carries, in whatever turn, what the service
   }
 });
 
-test('the wall that holds a tooth is the one that its forces press it to, in either sense', async () => {
+test('holding wall balances the forces of its tooth', async () => {
   const page = await bed.open();
   for (const [name, wall] of [['paper-5.1', 'leading'], ['ring-with-more-teeth', 'trailing']]) {
     const { carrier } = await bed.server.ask('/v1/geometry', await bed.server.example(name));
@@ -108,7 +108,7 @@ test('the wall that holds a tooth is the one that its forces press it to, in eit
       const design = await (await fetch(`/v1/examples/${example}`)).json();
       const ask = async (path) => (await fetch(path, { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(design) })).json();
       const motion = new Motion(design, await ask('/v1/geometry'), await ask('/v1/sweep'));
-      // A tooth that has only just come to the flank carries nothing yet.
+      // A tooth that has just reached the flank is unloaded.
       return motion.frames.flatMap(({ angle }) => motion.loaded(angle)).filter(({ force }) => force.ring > 0).map(({ center, contacts, force }) => {
         const sum = { x: 0, y: 0 };
         for (const [key, { x, y }] of Object.entries(contacts)) {
@@ -123,7 +123,7 @@ test('the wall that holds a tooth is the one that its forces press it to, in eit
   }
 });
 
-test('the carrier’s outline is the service’s: fingers between cam and ring tips, walls as far from the slot’s middle as a tooth', async () => {
+test('carrier’s outline is that of the service', async () => {
   const page = await bed.open();
   for (const name of EXAMPLES) {
     await choose(page, name);
@@ -133,7 +133,7 @@ test('the carrier’s outline is the service’s: fingers between cam and ring t
     const { radius_mm: r, installed, count } = design.drive.teeth;
     const spacing = (2 * Math.PI) / (installed ?? count);
     for (const corner of [0, 1]) assert.ok(Math.abs(y[corner] - r) < 1e-12);
-    // The other wall, as far from the next slot's middle.
+    // The other wall, equally far from the next slot's middle.
     for (const corner of [2, 3]) assert.ok(Math.abs(x[corner] * Math.sin(spacing) - y[corner] * Math.cos(spacing) - r) < 1e-9);
     for (const [corner, radius] of [[0, carrier.inner_radius_limit_mm], [1, carrier.outer_radius_limit_mm], [2, carrier.outer_radius_limit_mm], [3, carrier.inner_radius_limit_mm]]) {
       assert.ok(Math.abs(Math.hypot(x[corner], y[corner]) - radius) < 1e-9);
@@ -144,11 +144,11 @@ test('the carrier’s outline is the service’s: fingers between cam and ring t
   }
 });
 
-test('the other shaft’s torque is the service’s, and is not made up where there is none', async () => {
+test('other shaft’s torque comes from the service', async () => {
   const page = await bed.open();
   const { load } = (await bed.server.answers(await bed.server.example('paper-5.1'))).sweep;
   assert.deepEqual(load, { input_torque_nm: 20, output_torque_nm: 280 });
-  // A drive that is impossible has no torque at its other shaft.
+  // An impossible drive has no torque at its other shaft.
   await page.fill(field('/drive/wave_generator/semi_minor_mm'), '60');
   await settled(page);
   await page.fill(field('/load/input_torque_nm'), '33');

@@ -1,4 +1,4 @@
-// What a new user is told: what this is, what words mean, what differs.
+// Introduction, definitions and differences for a new user.
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
@@ -6,11 +6,11 @@ import { choose, enter, field, pick, settled, testBed } from './harness.js';
 
 const bed = testBed({ before, after, afterEach });
 
-test('few sentences and one picture say what this is, until they are hidden', async () => {
+test('introduction has few sentences and can be hidden', async () => {
   const page = await bed.open();
   assert.match(await page.textContent('#intro p'), /wave generator, here an ellipse, pushes loose teeth.*Change the design/);
   for (const label of ['Ring', 'Tooth', 'Carrier', 'Wave generator']) assert.ok((await page.textContent('.picture')).includes(label));
-  // No label is cut off.
+  // No label is truncated.
   const cut = await page.$$eval('.picture text', (texts) => texts.filter((text) => {
     const [own, whole] = [text.getBoundingClientRect(), text.ownerSVGElement.getBoundingClientRect()];
     return own.left < whole.left || own.right > whole.right;
@@ -25,7 +25,7 @@ test('few sentences and one picture say what this is, until they are hidden', as
   assert.ok(await page.isVisible('#intro'));
 });
 
-test('help, API, save and load are in the menu', async () => {
+test('menu has help, API, save and load', async () => {
   const page = await bed.open();
   await page.click('[popovertarget=menu]');
   for (const id of ['#help', '#api', '#save', '#load']) assert.ok(await page.isVisible(id), id);
@@ -36,7 +36,7 @@ test('help, API, save and load are in the menu', async () => {
   assert.ok(!(await page.isVisible('#help-dialog')));
 });
 
-test('words have their definitions beside them, with mouse and keyboard', async () => {
+test('words have definitions for mouse and keyboard', async () => {
   const page = await bed.open();
   const definition = page.locator('#definition');
   for (const [mark, wanted] of [
@@ -60,7 +60,7 @@ test('words have their definitions beside them, with mouse and keyboard', async 
   }
 });
 
-test('a comparison shows the inputs that differ', async () => {
+test('comparison shows the inputs that differ', async () => {
   const page = await bed.open();
   await page.click('#keep');
   assert.equal(await page.textContent('#differing'), 'All inputs are the same.');
@@ -76,7 +76,7 @@ test('a comparison shows the inputs that differ', async () => {
   assert.equal(await page.textContent('#inputs'), '');
 });
 
-test('on a small screen a comparison keeps its labels legible, and scrolls in its own box', async () => {
+test('comparison scrolls in its box on small screens', async () => {
   const page = await bed.open({ viewport: { width: 768, height: 1024 } });
   await page.click('#keep');
   await enter(page, '/load/input_torque_nm', 3);
@@ -86,7 +86,7 @@ test('on a small screen a comparison keeps its labels legible, and scrolls in it
   assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 768);
 });
 
-test('j is the wave generator’s angle alone', async () => {
+test('symbol j means only the wave generator’s angle', async () => {
   const page = await bed.open();
   await choose(page, 'paper-5.1');
   assert.match(await page.textContent('#readout caption'), /Δj = /);

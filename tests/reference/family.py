@@ -6,7 +6,7 @@ Writes family.json beside itself: what tests/calculation/reference.rs holds the 
     usage: python3 family.py
 
 Geometry is that of friction.py: curves of the cam and of the path of the teeth's centres, differentiated numerically, and forces from the
-balance of a tooth in the plane. Gaps are not the formulas of docs/theory.md section 4.8: each part's displacement is a vector, and the gap is how
+balance of a tooth in the plane. Gaps are not the formulas of docs/explanation/theory.md section 4.8: each part's displacement is a vector, and the gap is how
 far it takes the surface away from the tooth along the contact's normal. A tooth then gives way, by the laws of section 4.3 and with elliptic integrals
 from mpmath, as far as the work of its three forces says; one rotation serves all teeth and is found by bisection and the rule of false position.
 Speeds of the members are the one linear relation that each contact's rolling gives, in fractions.

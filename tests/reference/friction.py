@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Coulomb friction in discrete-tooth harmonic drives, tooth by tooth and without approximation.
 
-Writes friction.json beside itself: what src/solver/losses.rs is held against (docs/theory.md, section 10).
+Writes friction.json beside itself: what src/solver/losses.rs is held against (docs/explanation/theory.md, section 10).
 
     usage: python3 friction.py               friction.json
            python3 friction.py ranges 40     how far first order is from the exact equilibrium, over the drives below

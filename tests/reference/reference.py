@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """High-precision reference values for discrete-tooth harmonic drives.
 
-Writes four files beside itself, each a list of design documents with what the model of docs/theory.md
+Writes four files beside itself, each a list of design documents with what the model of docs/explanation/theory.md
 makes of them, to 40 digits:
 
     cases.json           geometry, mesh, forces and stresses under linear contact stiffness
@@ -12,7 +12,7 @@ makes of them, to 40 digits:
     usage: python3 reference.py [group or file ...]      (nothing: everything, and all files are written;
                                                           a file's name: its groups, and it is written)
 
-The numbers are found by other means than the closed forms of docs/theory.md where there are any:
+The numbers are found by other means than the closed forms of docs/explanation/theory.md where there are any:
 
   - the cam is a parametric ellipse with its normal, not a support function; a tooth is where its centre
     lies on its slot's line, found by bracketing and Newton's method;
@@ -21,7 +21,7 @@ The numbers are found by other means than the closed forms of docs/theory.md whe
   - the forces come from unit vectors in equilibrium; one bracketed search for the wave generator's
     micro-rotation serves every contact law and clearance.
 
-Where docs/theory.md gives a closed form, `check_closed_forms` compares; where the load sharing is linear,
+Where docs/explanation/theory.md gives a closed form, `check_closed_forms` compares; where the load sharing is linear,
 `check_load_sharing_by_matrix` solves the assembled equations.
 
 A case's `expected` holds scalars under the API's names; `rows`, at most 24 states as columns, with
@@ -74,7 +74,7 @@ CONVERGED = mpf(10) ** -60     # a Newton step this small leaves an error of its
 HALF_ULP = mpf(2) ** -53
 MAX_ROWS = 24
 
-PALMGREN_MM = mpf("3.84e-5")   # delta = 3.84e-5 F^0.9 / L^0.8, docs/theory.md section 4
+PALMGREN_MM = mpf("3.84e-5")   # delta = 3.84e-5 F^0.9 / L^0.8, docs/explanation/theory.md section 4
 CONTACTS = ("wave_generator", "ring", "carrier")
 PARTS = ("wave_generator", "teeth", "ring", "carrier")
 
@@ -145,7 +145,7 @@ def turn_to_rad(turn):
 
 
 # ---------------------------------------------------------------------------------------------------------
-# The tooth on the wave generator (docs/theory.md, section 2)
+# The tooth on the wave generator (docs/explanation/theory.md, section 2)
 # ---------------------------------------------------------------------------------------------------------
 
 def newton_contact_parameter(a, b, r, psi, t):
@@ -248,7 +248,7 @@ def tooth_at(path, turn):
 
 
 def check_closed_forms(path, tooth):
-    """docs/theory.md, section 2: the support function, the pressure angles and the curvature of the path."""
+    """docs/explanation/theory.md, section 2: the support function, the pressure angles and the curvature of the path."""
     a, b, r, k = path
     k = mpf(k.numerator) / k.denominator
     psi = turn_to_rad(tooth.turn)
@@ -275,7 +275,7 @@ def check_closed_forms(path, tooth):
 
 
 # ---------------------------------------------------------------------------------------------------------
-# Undercut, tip, engagement (docs/theory.md, sections 2 and 3)
+# Undercut, tip, engagement (docs/explanation/theory.md, sections 2 and 3)
 # ---------------------------------------------------------------------------------------------------------
 
 def bracketed_root(function, low, high):
@@ -402,7 +402,7 @@ def geometry(drive):
 
 
 # ---------------------------------------------------------------------------------------------------------
-# Load sharing (docs/theory.md, section 4)
+# Load sharing (docs/explanation/theory.md, section 4)
 # ---------------------------------------------------------------------------------------------------------
 
 def input_torque_nmm(drive):
@@ -614,7 +614,7 @@ def share_load(drive, teeth):
 
 
 def hertz_stress(drive, part, force, curvature):
-    """Equation (8), docs/theory.md section 5."""
+    """Equation (8), docs/explanation/theory.md section 5."""
     return mp.sqrt(force * curvature / (mp.pi * drive.reals["width"] * pair_compliance(drive, part)))
 
 
@@ -1375,7 +1375,7 @@ def solve_extreme_case(case):
 
 
 # ---------------------------------------------------------------------------------------------------------
-# What must fit (docs/theory.md, section 7; the API's ranges)
+# What must fit (docs/explanation/theory.md, section 7; the API's ranges)
 # ---------------------------------------------------------------------------------------------------------
 
 def tooth_center_in_doubles(a, b, r, psi):
@@ -1410,7 +1410,7 @@ def closest_neighbours(drive):
 
 
 def check_flank(path, start):
-    """What docs/theory.md, section 2, says of the flank from the root to its end: regular, ever nearer to the
+    """What docs/explanation/theory.md, section 2, says of the flank from the root to its end: regular, ever nearer to the
     axis, and short of the symmetry line of the ring's tooth."""
     flanks = [(psi, flank_at(path, psi)) for psi in (start * i / 24 for i in range(25))]
     for (_, before), (psi, flank) in zip(flanks, flanks[1:]):
@@ -1451,7 +1451,7 @@ def check_possible(drive, scalars):
 def design(a, b, r, teeth, ring_teeth, *, installed=None, width=15.0, bore=None, torque=20.0, output_torque=None,
            compatibility="projection", stiffness=None, law="linear", clearance=None, materials=None, samples=10,
            depth=None, series=None, groove=None, ball=False):
-    """A complete design document, as docs/theory.md's case 5.1 and 5.2 would be written."""
+    """A complete design document, as docs/explanation/theory.md's case 5.1 and 5.2 would be written."""
     ring = {"teeth": ring_teeth}
     if bore is not None:
         ring["tip_radius_mm"] = bore
@@ -1868,7 +1868,7 @@ FILES = {
 
 
 # ---------------------------------------------------------------------------------------------------------
-# What docs/theory.md, section 6, says was found
+# What docs/explanation/theory.md, section 6, says was found
 # ---------------------------------------------------------------------------------------------------------
 
 PAPER_PEAKS = {

@@ -6,7 +6,7 @@
 Geometry, directions and compliances of the teeth are those of reference.py; chance is numpy's (PCG64), not the counter-based generator of
 the studies, and the load is shared by bisection, not by counting the teeth that have closed their gaps. Which space a tooth meets follows
 from counting: in the carrier's frame tooth i stands at i/Z_G turns and the cam at `shift`/Z_G; it is on lobe l of two where
-|psi| <= a quarter turn, psi = i/Z_G - shift/Z_G - l/2, and stands then in the space i - l modulo Z_K (docs/theory.md, section 9).
+|psi| <= a quarter turn, psi = i/Z_G - shift/Z_G - l/2, and stands then in the space i - l modulo Z_K (docs/explanation/theory.md, section 9).
 
 `values` holds the drives' quantities, sorted, each with nine digits; `drives` the deviations of some of them with their own quantities.
 """

@@ -1,4 +1,5 @@
-//! What gives way behind the contacts, against finite elements of the same bodies (`tests/finite_elements/backing.py`) and against the model itself.
+//! Compliance of the supports, against finite elements of the same bodies (`tests/finite_elements/backing.py`)
+//! and against the model itself.
 
 use std::f64::consts::PI;
 
@@ -69,7 +70,7 @@ fn backings(parameters: &DriveParameters, parts: &PartsParameters, support: Supp
     Backings::of(&drive(parameters), &Draft::new(parameters).unwrap(), parts, support)
 }
 
-/// Estimates and shares of a drive under a load.
+/// Estimates the compliances of a loaded drive and their shares.
 fn shares(parameters: &DriveParameters, load: &LoadParameters, support: Support) -> Option<Shares> {
     let sweep = swept(parameters, load, 50);
     let backings = backings(parameters, &PartsParameters::default(), support);
@@ -84,7 +85,7 @@ const AT_ONE_END: Support = Support { fingers: Some(Fingers::HeldAtOneEnd), rim:
 const FREE: Support = Support { fingers: None, rim: Some(Rim::Free) };
 
 #[test]
-fn fingers_bend_as_finite_elements_of_them_do() {
+fn finger_compliance_matches_finite_elements() {
     for finger in results().fingers {
         let Finger { length_mm, thickness_mm, height_mm, at_both_ends, compliance_mm_per_n } = finger;
         let held = if at_both_ends { Fingers::HeldAtBothEnds } else { Fingers::HeldAtOneEnd };
@@ -97,7 +98,7 @@ fn fingers_bend_as_finite_elements_of_them_do() {
 }
 
 #[test]
-fn a_free_rim_bends_as_finite_elements_of_it_do() {
+fn free_rim_compliance_matches_finite_elements() {
     for rim in results().free_rims {
         let FreeRim { inner_radius_mm, outer_radius_mm, width_mm, teeth, lobes, compliance_mm_per_n } = rim;
         let found = RimStrip { inner_radius_mm, outer_radius_mm, width_mm, teeth, lobes }
@@ -110,7 +111,7 @@ fn a_free_rim_bends_as_finite_elements_of_it_do() {
 }
 
 #[test]
-fn rims_and_cams_held_at_their_backs_give_way_as_finite_elements_of_them_do() {
+fn held_rims_and_cams_match_finite_elements() {
     for body in results().held_bodies {
         let HeldBody { surface_radius_mm, held_radius_mm, tooth_radius_mm, width_mm, teeth, compliance_mm_per_n } =
             body;
@@ -120,7 +121,7 @@ fn rims_and_cams_held_at_their_backs_give_way_as_finite_elements_of_them_do() {
             width_mm,
         };
         let found = strip.compliance_mm_per_n(&Material::STEEL, tooth_radius_mm);
-        // A rim is a strip; a deep cam narrows towards its bore, and its load is not even.
+        // A rim is a strip. A deep cam narrows towards its bore, and its load is uneven.
         let is_rim = held_radius_mm > surface_radius_mm;
         let of_steel = 0.91 / (PI * 210e3 * width_mm);
         let allowed = if is_rim { 0.1 * of_steel } else { 0.3 * compliance_mm_per_n };
@@ -132,41 +133,41 @@ fn rims_and_cams_held_at_their_backs_give_way_as_finite_elements_of_them_do() {
 }
 
 #[test]
-fn a_body_held_at_half_a_pitch_gives_way_alike_by_either_form() {
+fn held_body_compliance_is_continuous_in_depth() {
     let strip = |depth_mm| HeldStrip { depth_mm, pitch_mm: 8.0, width_mm: 15.0 };
     let at = |depth_mm| strip(depth_mm).compliance_mm_per_n(&Material::STEEL, 2.0);
     assert!((at(4.0 - 1e-9) / at(4.0 + 1e-9) - 1.0).abs() < 1e-8);
-    // The nearer it is held the less it gives way, at last less than the law has counted already.
+    // A body held nearer is stiffer, finally stiffer than the contact law already assumes.
     assert!(at(8.0) > at(4.0) && at(4.0) > at(2.0) && at(0.5) < 0.0);
 }
 
 #[test]
-fn a_finger_is_as_thick_as_the_walls_of_its_slots_are_apart_in_the_middle_of_its_height() {
+fn finger_thickness_is_wall_distance_at_mid_height() {
     let shares = shares(&PAPER_5_1, &johnson(20.0), AT_ONE_END).unwrap();
     let found = shares.shares.iter().find(|(estimate, _)| estimate.backing == Backing::FingerAtOneEnd).unwrap().0;
-    // From 58.8 to 65.2 mm, where the middles of two slots are 2 · 62 sin(π/28) apart.
+    // From 58.8 to 65.2 mm. The middles of two slots are 2 · 62 sin(π/28) apart.
     let beam = FingerBeam { length_mm: 15.0, thickness_mm: 124.0 * (PI / 28.0).sin() - 10.0, height_mm: 6.4 };
     let expected = beam.compliance_mm_per_n(&Material::STEEL, Fingers::HeldAtOneEnd);
     assert!((found.compliance_mm_per_n / expected - 1.0).abs() < 1e-12, "{} {expected}", found.compliance_mm_per_n);
 }
 
 #[test]
-fn a_housed_rim_is_a_strip_as_deep_as_the_rim_on_which_a_tooth_presses_at_every_slots_pitch() {
+fn housed_rim_is_strip_with_slot_pitch() {
     let parts = PartsParameters { ring_outer_radius_mm: Some(88.0), ..PartsParameters::default() };
     let load = johnson(20.0);
     let backings = backings(&PAPER_5_1, &parts, AT_ONE_END);
     let case = LoadCase::new(&load).unwrap();
     let estimates = backings.estimates(&drive(&PAPER_5_1), &case);
     let found = estimates.iter().find(|estimate| estimate.backing == Backing::HousedRim).unwrap();
-    // Of teeth on the root circle of 68 mm, the rim deeper than half their pitch.
+    // Teeth press on the root circle of 68 mm. The rim is deeper than half their pitch.
     let strip = HeldStrip { depth_mm: 20.0, pitch_mm: 2.0 * PI * 68.0 / 28.0, width_mm: 15.0 };
     let expected = strip.compliance_mm_per_n(&Material::STEEL, 5.0);
     assert!((found.compliance_mm_per_n / expected - 1.0).abs() < 1e-12, "{} {expected}", found.compliance_mm_per_n);
 }
 
-/// By Johnson's law for the teeth's own approach, each half of which is of its body's own elasticity.
+/// The teeth's own approach follows Johnson's law, with each half from its body's own elasticity.
 #[test]
-fn the_share_of_a_backing_is_its_part_of_what_a_tooth_gives_way_at_its_own_contacts() {
+fn backing_share_is_relative_to_own_contacts() {
     let bronze = Material { youngs_modulus_gpa: 110.0, poissons_ratio: 0.35 };
     let steel = Material::STEEL;
     let materials = Materials { wave_generator: steel, teeth: steel, ring: bronze, carrier: bronze };
@@ -190,9 +191,9 @@ fn the_share_of_a_backing_is_its_part_of_what_a_tooth_gives_way_at_its_own_conta
     assert!((share / expected - 1.0).abs() < 1e-12, "{share}, expected {expected}");
 }
 
-/// What the estimate says of a tooth holds for the drive, but for the load that shifts to teeth which press their fingers less.
+/// The estimate for one tooth holds for the drive, except for load that shifts to other teeth.
 #[test]
-fn fingers_held_at_one_end_double_the_wind_up_of_case_5_1_and_take_an_eighth_off_its_peak() {
+fn fingers_held_at_one_end_soften_drive() {
     let plain = johnson(20.0);
     let of_fingers = shares(&PAPER_5_1, &plain, AT_ONE_END).unwrap();
     let estimate = of_fingers.shares.iter().find(|(estimate, _)| estimate.backing == Backing::FingerAtOneEnd).unwrap();
@@ -203,13 +204,13 @@ fn fingers_held_at_one_end_double_the_wind_up_of_case_5_1_and_take_an_eighth_off
     let peak = after.peaks.wave_generator.force_n.value / before.peaks.wave_generator.force_n.value;
     assert!((1.9..2.0).contains(&wind_up) && (0.86..0.885).contains(&peak), "{wind_up}, {peak}");
     assert!((1.0..1.2).contains(&((1.0 + estimate.1) / wind_up)), "share {}", estimate.1);
-    // What is given is no longer left out.
+    // A given compliance no longer counts as left out.
     let left = shares(&PAPER_5_1, &given, AT_ONE_END).unwrap();
     assert!(left.shares.iter().all(|(estimate, _)| estimate.backing != Backing::FingerAtOneEnd));
 }
 
 #[test]
-fn a_free_rim_and_fingers_at_one_end_are_findings_and_stiff_parts_are_not() {
+fn only_soft_parts_are_findings() {
     let found = |parameters: &DriveParameters, load: &LoadParameters, support| {
         shares(parameters, load, support).map(|shares| findings::of_backing(&shares))
     };
@@ -221,13 +222,13 @@ fn a_free_rim_and_fingers_at_one_end_are_findings_and_stiff_parts_are_not() {
     );
     let free = found(&PAPER_5_1, &johnson(20.0), FREE).unwrap();
     assert!(matches!(free[..], [Finding::SoftRim { share, is_free: true }] if share > 10.0), "{free:?}");
-    // Those of case 5.2 are a millimetre and a half high: slender however they are held.
+    // The fingers of case 5.2 are 1.5 mm high and so slender with any support.
     let low = found(&PAPER_5_2, &johnson(3.0), Support::default()).unwrap();
     assert!(
         matches!(low[..], [Finding::SlenderFingers { share, is_held_at_one_end: false }] if share > 0.2 && share < 1.0),
         "{low:?}"
     );
-    // Under other laws wind-up is further off by itself.
+    // Other laws have a larger error of the wind-up anyway.
     let fixed = ContactLaw::Fixed(PerContact { wave_generator: 4e5, ring: 4e5, carrier: 4e5 });
     for law in [fixed, ContactLaw::Linear, ContactLaw::Palmgren] {
         assert_eq!(found(&PAPER_5_1, &LoadParameters { law, ..johnson(20.0) }, AT_ONE_END), None);
@@ -235,7 +236,7 @@ fn a_free_rim_and_fingers_at_one_end_are_findings_and_stiff_parts_are_not() {
 }
 
 #[test]
-fn the_models_error_tells_how_the_parts_are_held() {
+fn model_error_reports_how_parts_are_held() {
     let held = |parameters: &DriveParameters, load: LoadParameters, support: Support| {
         let sweep = swept(parameters, &load, 50);
         let shares = shares(parameters, &load, support);
@@ -261,7 +262,7 @@ fn the_models_error_tells_how_the_parts_are_held() {
 }
 
 #[test]
-fn the_errors_of_all_that_gives_way_add_up_as_springs_in_a_row() {
+fn errors_of_backings_add_like_series_springs() {
     let both = Support { fingers: Some(Fingers::HeldAtOneEnd), rim: Some(Rim::Free) };
     let shares = shares(&PAPER_5_1, &johnson(20.0), both).unwrap();
     let sum = share(&shares, Backing::FreeRim) + share(&shares, Backing::FingerAtOneEnd);
@@ -269,7 +270,7 @@ fn the_errors_of_all_that_gives_way_add_up_as_springs_in_a_row() {
 }
 
 #[test]
-fn only_parts_that_can_be_made_and_pressed_along_a_line_have_estimates() {
+fn only_makeable_parts_with_line_contact_have_estimates() {
     let of = |parameters: &DriveParameters, parts: PartsParameters| -> Vec<Backing> {
         let case = LoadCase::new(&johnson(20.0)).unwrap();
         let estimates = backings(parameters, &parts, Support::default()).estimates(&drive(parameters), &case);

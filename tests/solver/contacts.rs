@@ -1,4 +1,4 @@
-//! Forces with gaps, and what each part of the model is there for, against the equations themselves.
+//! Forces with gaps, against the equations themselves.
 
 use toothwave_solver::drive::Draft;
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
@@ -9,7 +9,7 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse, load, swept};
 
-/// The paper's weights [3][6], by angles, or those of virtual work, by forces.
+/// Returns the paper's weights [3][6] by angles, or those of virtual work by forces.
 fn weights(drive: &Drive, tooth: &ToothState, compatibility: Compatibility) -> PerContact<f64> {
     let (cam, ring) = (tooth.center.tan_pressure_angle.atan(), tooth.flank.tan_pressure_angle.atan());
     match compatibility {
@@ -27,7 +27,7 @@ fn weights(drive: &Drive, tooth: &ToothState, compatibility: Compatibility) -> P
 }
 
 #[test]
-fn with_gaps_every_tooth_that_carries_fulfils_its_compatibility_and_no_other_is_closed() {
+fn exactly_loaded_teeth_close_their_gaps() {
     let samples = Samples::new(11).unwrap();
     let stiffness = PerContact { wave_generator: 1.3e6, ring: 0.8e6, carrier: 0.9e6 };
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
@@ -72,7 +72,7 @@ fn with_gaps_every_tooth_that_carries_fulfils_its_compatibility_and_no_other_is_
 }
 
 #[test]
-fn the_transmission_error_is_the_range_of_the_wind_up_divided_by_the_ratio() {
+fn transmission_error_is_wind_up_range_over_ratio() {
     let sweep = swept(&PAPER_5_2, &load(3.0, Compatibility::VirtualWork), 300);
     let wind_up_deg = &sweep.input_angles.wind_up_deg;
     let most = wind_up_deg.iter().copied().fold(0.0, f64::max);
@@ -92,9 +92,9 @@ fn is_refused(parameters: &DriveParameters, contact: Contact) -> bool {
 }
 
 #[test]
-fn projection_takes_gaps_where_their_weight_is_positive_and_refuses_them_where_it_is_not() {
+fn projection_takes_gaps_of_positive_weight_only() {
     let backwards = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..PAPER_5_1 };
-    // γ + β beyond 90°: the ring's weight cos(γ + β) is negative there.
+    // With γ + β above 90° the ring's weight cos(γ + β) is negative.
     let steep = DriveParameters {
         wave_generator: ellipse(58.0, 20.0),
         tip_radius_mm: Some(58.5),
@@ -114,7 +114,7 @@ fn projection_takes_gaps_where_their_weight_is_positive_and_refuses_them_where_i
 }
 
 #[test]
-fn the_steepest_engaged_tooth_is_the_steepest_of_those_up_to_the_end_of_the_flank() {
+fn steepest_engaged_tooth_is_steepest_before_flank_end() {
     let short = DriveParameters { tip_radius_mm: Some(67.5), ..PAPER_5_1 };
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, short] {
         let possible = drive(&parameters);

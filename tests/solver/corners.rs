@@ -1,4 +1,5 @@
-//! Teeth against the corners of pointed and bored tips: against finite elements, against springs put up from the geometry alone, and what must hold of any load.
+//! Contact at the corners of pointed and bored tips: against finite elements, against springs made from the geometry,
+//! and invariants of any load.
 
 use nalgebra::{Matrix2, Point2, Rotation2, Vector2};
 use proptest::prelude::*;
@@ -50,7 +51,7 @@ struct Tooth {
 }
 
 impl Case {
-    /// The load, with all of the model refined that can be, and depths of bodies that are held where those of the case are.
+    /// Returns the load with all refinements, and with depths up to where the case's bodies are held.
     fn refined(&self) -> LoadParameters {
         LoadParameters {
             law: ContactLaw::Johnson { depth_mm: PerContact::of(|_| Some(self.depth_mm)) },
@@ -72,7 +73,7 @@ fn results() -> Results {
     serde_json::from_str(include_str!("../finite_elements/corners.json")).unwrap()
 }
 
-/// ψ_e of case 5.2.
+/// Position ψ_e of the flank's end in case 5.2, in degrees.
 const FLANK_END_DEG: f64 = 43.607_599;
 
 const JOHNSON: ContactLaw =
@@ -82,13 +83,13 @@ fn pressed_corners(torque_nm: f64) -> LoadParameters {
     LoadParameters { law: JOHNSON, corner_contact: true, ..load(torque_nm, VirtualWork) }
 }
 
-/// Of a sweep the states at an input angle.
+/// Returns the states at an input angle.
 fn at_angle(states: &States, input_angle_deg: f64) -> Vec<usize> {
     (0..states.len()).filter(|&at| (states.input_angle_deg[at] - input_angle_deg).abs() < 1e-9).collect()
 }
 
 #[test]
-fn finer_elements_find_the_same_force_at_a_corner() {
+fn corner_force_converges_with_finer_elements() {
     let [first, finest] = &results().convergence[..] else { panic!("two refinements") };
     assert!((first.wind_up_rad / finest.wind_up_rad - 1.0).abs() < 1e-3);
     let largest = finest.force_n.iter().copied().fold(0.0, f64::max);
@@ -97,10 +98,10 @@ fn finer_elements_find_the_same_force_at_a_corner() {
     }
 }
 
-/// The model is refined in all that it can be. Nearest to the flank's end, on either side, its tooth carries too much: the compliance of the ring's teeth knows a contact
-/// of one width, and here the corner cuts off a part of it.
+/// Beside the flank's end a tooth carries too much: the ring teeth's compliance assumes a contact of one width,
+/// and the corner cuts off a part of it.
 #[test]
-fn teeth_at_a_pointed_tip_carry_what_elastic_ones_do() {
+fn teeth_at_pointed_tip_match_finite_elements() {
     for case in results().cases {
         let Case { input_angle_deg, ring_gap_um, ref teeth, .. } = case;
         let refined = case.refined();
@@ -133,16 +134,15 @@ fn teeth_at_a_pointed_tip_carry_what_elastic_ones_do() {
     }
 }
 
-/// As `model_error` tells of other models: the ranges hold the errors of the largest force of each contact, of the pressure there and of the wind-up, and go no further than
-/// they have to.
+/// The ranges of `model_error` hold the errors of force, pressure and wind-up, and are no wider than needed.
 #[test]
-fn the_model_says_how_far_it_is_off_at_pointed_tips() {
+fn model_reports_its_error_at_pointed_tips() {
     for has_gaps in [false, true] {
         let mut found = [(f64::INFINITY, f64::NEG_INFINITY); 3];
         let mut told = None;
         let results = results();
         let cases = results.cases.iter().filter(|case| (case.ring_gap_um > 0.0) == has_gaps);
-        // Without a gap the wave generator stays, if the document does not say otherwise.
+        // Without a gap the wave generator does not move by default.
         let moves = |&moves: &bool| moves || !has_gaps;
         for (case, wave_generator_moves) in
             cases.flat_map(|case| [true, false].into_iter().filter(moves).map(move |moves| (case, moves)))
@@ -185,7 +185,7 @@ fn the_model_says_how_far_it_is_off_at_pointed_tips() {
     }
 }
 
-/// What a tooth does, from where its centre and the corner are: directions of its forces, and what its circle keeps from the corner, in the slot's frame.
+/// A tooth and its corner in the slot's frame: directions of its forces, and the gap between its circle and the corner.
 struct Seen {
     to_cam: Vector2<f64>,
     to_ring: Vector2<f64>,
@@ -193,14 +193,15 @@ struct Seen {
     gap_mm: f64,
 }
 
-/// The corner from the flank's end, by angles alone, the ring turned away by an angle.
+/// Calculates the corner from the flank's end by angles alone, with the ring rotated.
 fn seen(drive: &Drive, position_deg: f64, turned_away_rad: f64) -> Seen {
     let (flank, lobes) = (drive.flank(), drive.lobes());
     let end = flank.locus().at(drive.flank_limit().position).unwrap();
     let corner = flank.point(&end, &flank.at(&end));
     let tooth = flank.locus().at(Position::from_lobe(position_deg.to_radians(), lobes)).unwrap();
     let k = flank.teeth_per_wave();
-    // In the ring's frame the tooth has gone back by ψ/k, s aside, from the middle of its space; the slot's frame is turned so, and turned over where s is -1.
+    // In the ring's frame the tooth has moved back by ψ/k, in sense s, from the middle of its space. The slot's frame
+    // is rotated likewise, and mirrored if s is -1.
     let in_slot = Rotation2::new(turned_away_rad - position_deg.to_radians() / k) * corner;
     let (sense, d) = (drive.sense(), tooth.center_radius_mm);
     let way = Point2::new(in_slot.x, -sense * in_slot.y) - Point2::new(d, 0.0);
@@ -215,9 +216,9 @@ fn seen(drive: &Drive, position_deg: f64, turned_away_rad: f64) -> Seen {
 
 const STIFFNESS: PerContact<f64> = PerContact { wave_generator: 4e5, ring: 3e5, carrier: 5e5 };
 
-/// Each tooth before the flank is a point on three springs, pushed by the wave generator: two equations of equilibrium for the two ways that it can go.
+/// One spring is at the corner. The wave generator pushes the tooth: two equilibrium equations, two degrees of freedom.
 #[test]
-fn before_the_flank_a_tooth_is_a_point_on_three_springs_one_of_them_at_the_corner() {
+fn tooth_before_flank_is_point_on_three_springs() {
     let with_more = DriveParameters { ring_teeth: 82, ..PAPER_5_2 };
     for (parameters, turned_arcsec) in [(PAPER_5_2, 0.0), (PAPER_5_2_BORED, 0.0), (with_more, 0.0), (PAPER_5_2, 0.2)] {
         let gaps_mm = PerContact { wave_generator: 1e-4, ring: 2e-4, carrier: 3e-4 };
@@ -238,7 +239,7 @@ fn before_the_flank_a_tooth_is_a_point_on_three_springs_one_of_them_at_the_corne
             let position = Position::from_lobe(states.position_deg[at].to_radians(), drive.lobes());
             let center = drive.flank().locus().at(position).unwrap();
             let arm_mm = center.cam_contact.lever_arm_mm;
-            // It is there when the wave generator has made up for the ring's turn and for the gap of its slot.
+            // Contact starts when the rotation has closed the ring's rotation and the slot's gap.
             let turned = turned
                 - drive.flank().teeth_per_wave() * turned_rad
                 - drive.teeth_per_wave() * gaps_mm.carrier / center.center_radius_mm;
@@ -272,9 +273,9 @@ fn before_the_flank_a_tooth_is_a_point_on_three_springs_one_of_them_at_the_corne
     }
 }
 
-/// Without the option the same loads jump by half of the peak there.
+/// Without corner contact these loads jump by half of the peak.
 #[test]
-fn loads_run_on_through_the_flanks_end() {
+fn loads_are_continuous_at_flank_end() {
     for (bend, moves, gap_um) in [(false, false, 0.0), (true, false, 0.0), (true, true, 10.0)] {
         let pressed = LoadParameters {
             ring_teeth_bend: bend,
@@ -304,9 +305,9 @@ fn loads_run_on_through_the_flanks_end() {
     }
 }
 
-/// A contact that is α off the flank, of relative curvature Σ, is b wide where `α b + π Σ b²/4 = F/(L1 E*)`: of a blunt wedge, of Hertz's cylinder, and of both.
+/// A contact at angle α off the flank, of relative curvature Σ, has half width b by `α b + π Σ b²/4 = F/(L1 E*)`.
 #[test]
-fn a_narrower_contact_gives_way_by_the_logarithm_of_its_width() {
+fn narrower_contact_adds_logarithm_of_its_width() {
     let (drive, load) = (drive(&PAPER_5_2), LoadCase::new(&pressed_corners(3.0)).unwrap());
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
     let (flank, end) = (drive.flank(), drive.flank_limit().position);
@@ -324,7 +325,7 @@ fn a_narrower_contact_gives_way_by_the_logarithm_of_its_width() {
             let per_mm = ring_n / (15.0 * modulus_mpa);
             let half_mm = 2.0 * per_mm / (angle_rad + (angle_rad * angle_rad + 4.0 * square * per_mm).sqrt());
             let u = half_mm / (per_mm / square).sqrt();
-            // What the same contacts give way by if none is narrower, by Johnson (docs/theory.md 4.3).
+            // Approach of the same contacts without narrowing, by Johnson (docs/explanation/theory.md 4.3).
             let of_contact = |force_n: f64, curvature: f64| {
                 let half_mm = (4.0 * force_n / (std::f64::consts::PI * 15.0 * modulus_mpa * curvature)).sqrt();
                 0.5 * growth_mm_per_n
@@ -348,10 +349,11 @@ fn a_narrower_contact_gives_way_by_the_logarithm_of_its_width() {
     }
 }
 
-/// Pressed at right angles to one face an apex gives way by `π (sin²w/(w + sin w cos w) + cos²w/(w - sin w cos w))` of a logarithm, w half of the wedge's angle, where a
-/// wall has 2 (J. H. Michell, 1900). The angle is measured between the flank's tangent and the tooth's symmetry line, or the land.
+/// J. H. Michell (1900): a force normal to one face of an apex with half angle w moves it by
+/// `π (sin²w/(w + sin w cos w) + cos²w/(w - sin w cos w))` of a logarithm, where a half-plane has 2.
+/// The angle is between the flank's tangent and the tooth's symmetry line, or the land.
 #[test]
-fn where_teeth_bend_a_corner_gives_way_as_the_apex_of_a_wedge() {
+fn corner_of_bending_teeth_deflects_as_wedge_apex() {
     let compliance_mm_per_n = (1.0 - 0.3 * 0.3) / 210e3 / (std::f64::consts::PI * 15.0);
     for parameters in [PAPER_5_2, PAPER_5_2_BORED] {
         let drive = drive(&parameters);
@@ -379,7 +381,7 @@ fn where_teeth_bend_a_corner_gives_way_as_the_apex_of_a_wedge() {
         let ratio = rigid.force_ratio.ring;
         let to_corner = seen(&drive, at_corner.from_lobe_deg(), 0.0).to_ring;
         let angle_rad = at_end.tan_pressure_angle.atan() - (-to_corner.y / to_corner.x).atan() - 0.05 / 39.0;
-        // Beside what bends in proportion to the force there is the logarithm of the contact's width.
+        // Bending is proportional to the force; the rest is the logarithm of the contact's width.
         let per_n = |cam_force_n: f64| {
             let approach_mm = |tooth: &ToothState| tooth.spring.approach.approach_mm(cam_force_n);
             (approach_mm(&bending) - approach_mm(&rigid)) / (cam_force_n * ratio * ratio)
@@ -412,9 +414,9 @@ fn natural_tips_and_balls_have_no_corner() {
     }
 }
 
-/// Such a tooth is behind the corner in both directions, and the tangent of the line between them is positive again.
+/// Behind the corner in both directions, the tangent of the angle to the corner is positive again.
 #[test]
-fn a_tooth_that_is_past_the_corner_and_farther_out_carries_nothing() {
+fn tooth_beyond_corner_carries_nothing() {
     let wide_lands = DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 36.0, eccentricity_mm: 0.1 },
         teeth: 6,
@@ -450,9 +452,9 @@ fn a_tooth_that_is_past_the_corner_and_farther_out_carries_nothing() {
     }
 }
 
-/// A bore has taken so much of the flank, and gaps are so wide, that no tooth comes to it before others carry at their corners.
+/// The bore leaves a short flank, and gaps are wide: all loaded teeth touch corners.
 #[test]
-fn where_corners_alone_carry_there_is_an_answer_without_stress_at_the_ring() {
+fn corners_alone_carry_without_ring_stress() {
     let bored = DriveParameters { installed: 80, tip_radius_mm: Some(53.2), ..PAPER_5_2 };
     let gaps = PerContact { ring: 50.0, ..PerContact::default() };
     let load = LoadParameters {
@@ -468,7 +470,7 @@ fn where_corners_alone_carry_there_is_an_answer_without_stress_at_the_ring() {
 }
 
 #[test]
-fn flats_that_have_left_their_slots_before_the_flank_carry_nothing() {
+fn flats_outside_slots_before_flank_carry_nothing() {
     let flats = DriveParameters {
         wave_generator: WaveGenerator::Ellipse { semi_major_mm: 51.0, semi_minor_mm: 49.0 },
         tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 0.8 },
@@ -485,9 +487,9 @@ fn flats_that_have_left_their_slots_before_the_flank_carry_nothing() {
     assert!((of_flats - of_cylinders).abs() < 1.0 && of_flats > 37.0, "{of_flats}, with cylinders {of_cylinders} deg");
 }
 
-/// The more the corner of one space is turned away the later it is met, by its own arm: to first order the way that a point makes which is turned about the axis.
+/// To first order the corner moves as a point turned about the axis.
 #[test]
-fn a_space_that_is_turned_takes_its_corner_away_by_its_arm() {
+fn turned_space_moves_its_corner_by_its_arm() {
     let drive = drive(&PAPER_5_2);
     let end_deg = drive.flank_limit().position.from_lobe_deg();
     for beyond_deg in [0.1, 1.0, 4.0] {
@@ -510,9 +512,9 @@ fn a_space_that_is_turned_takes_its_corner_away_by_its_arm() {
     }
 }
 
-/// By virtual work: what the wall leaves counts as much as the slot's force does.
+/// By virtual work, the wall's gap is weighted with the slot's force.
 #[test]
-fn a_slot_that_is_turned_takes_its_tooth_from_the_corner_by_the_share_of_the_slots_force() {
+fn turned_slot_moves_tooth_by_slot_force_share() {
     let drive = drive(&PAPER_5_2);
     let end_deg = drive.flank_limit().position.from_lobe_deg();
     let case = LoadCase::new(&pressed_corners(3.0)).unwrap();
@@ -534,9 +536,9 @@ fn a_slot_that_is_turned_takes_its_tooth_from_the_corner_by_the_share_of_the_slo
     }
 }
 
-/// It is the same drive at another input angle. By a law that counted the turn as a gap at the corner forces changed by a tenth, and doubled.
+/// A rotation of the whole ring or carrier, or equal gaps at all slots, give the same drive at another input angle.
 #[test]
-fn a_ring_or_a_carrier_that_is_turned_as_a_whole_changes_no_force_at_corners_nor_do_alike_gaps_at_all_slots() {
+fn rigid_rotation_changes_no_corner_force() {
     for (parameters, moves) in [(PAPER_5_2, true), (PAPER_5_2_BORED, true), (PAPER_5_2, false)] {
         let of = |load: LoadParameters| swept(&parameters, &load, 24);
         let plain = LoadParameters { wave_generator_moves: moves, ..pressed_corners(3.0) };
@@ -551,7 +553,7 @@ fn a_ring_or_a_carrier_that_is_turned_as_a_whole_changes_no_force_at_corners_nor
                 }
             }
         }
-        // Aside by the same everywhere, but for a tooth being a few per cent farther out at the lobe than in the valley.
+        // The offset is equal everywhere, but a tooth is some per cent farther out at the lobe than in the valley.
         let carrier =
             |carrier| of(LoadParameters { clearance_um: PerContact { carrier, ..PerContact::default() }, ..plain });
         let near = carrier(10.0).peaks.wave_generator.force_n.value / as_it_is.peaks.wave_generator.force_n.value;
@@ -559,9 +561,9 @@ fn a_ring_or_a_carrier_that_is_turned_as_a_whole_changes_no_force_at_corners_nor
     }
 }
 
-/// Whether all of ring and carrier are turned, or each of their spaces and slots by as much.
+/// Either all of ring and carrier are turned, or each of their spaces and slots.
 #[test]
-fn what_is_turned_away_at_a_corner_adds_up_however_it_is_given() {
+fn corner_rotations_add_up_however_given() {
     let drive = drive(&PAPER_5_2);
     let (ring, carrier) = (3.0, 2.0);
     let forces = |is_ring_whole: bool, is_carrier_whole: bool| {
@@ -591,9 +593,9 @@ fn what_is_turned_away_at_a_corner_adds_up_however_it_is_given() {
     }
 }
 
-/// However far the wave generator turns: a tooth that no wall holds has no force at a corner either.
+/// A tooth outside its slot has no wall to hold it, and so no force at a corner.
 #[test]
-fn before_the_flank_a_flat_is_pressed_as_a_cylinder_is_until_it_has_left_its_slot() {
+fn flat_before_flank_is_pressed_as_cylinder() {
     let flats = DriveParameters {
         wave_generator: WaveGenerator::Ellipse { semi_major_mm: 51.0, semi_minor_mm: 49.0 },
         tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 0.8 },
@@ -629,9 +631,9 @@ fn corners_need_virtual_work() {
     assert_eq!(refused, Err(vec![Violation::NeedsVirtualWork { parameter: Parameter::CornerContact }]));
 }
 
-/// Every law, unlike zones, teeth with flats, a bored tip.
+/// Covers several laws, unlike zones, gaps and a bored tip.
 #[test]
-fn a_sweep_to_a_tolerance_finds_the_peaks_of_very_many_intervals() {
+fn tolerance_sweep_with_corners_finds_dense_peaks() {
     let unlike = DriveParameters { teeth: 81, installed: 27, ring_teeth: 79, ..PAPER_5_2 };
     let gaps = PerContact { ring: 4.0, ..PerContact::default() };
     for (parameters, of) in [
@@ -655,7 +657,7 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_very_many_intervals() {
         near("wind-up", largest(&found), largest(&dense));
         let capacity = |sweep: &Sweep| 1.0 / sweep.torque_capacity.unwrap().input_torque_nm;
         near("reciprocal of the capacity", capacity(&found), capacity(&dense));
-        // Where a tooth comes to the flank is looked at, and there the ring's stress begins.
+        // The sweep examines the angle at which a tooth reaches the flank, where the ring's stress begins.
         let (states, end_deg) = (&found.states, drive.flank_limit().position.from_lobe_deg());
         let stress_at_end = |is_told: bool| {
             let is_it = |at: usize| {
@@ -664,7 +666,7 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_very_many_intervals() {
             (0..states.len()).any(is_it)
         };
         assert!(stress_at_end(true) && stress_at_end(false));
-        // And no other tooth is moved for it.
+        // No other tooth is moved for this.
         let spacing_deg = 360.0 / parameters.installed as f64;
         for at in 1..states.len() {
             let apart_deg = states.position_deg[at] - states.position_deg[at - 1];
@@ -676,10 +678,10 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_very_many_intervals() {
     }
 }
 
-/// A tooth that has nearly come to the flank keeps from its corner the difference of two distances of 39 mm: some 1e-14 mm are rounding, and under 0.3 mN·m the contacts
-/// give way by 1e-6 mm.
+/// Near the flank the distance to the corner is a difference of two lengths of 39 mm, so rounding is 1e-14 mm.
+/// Under 0.3 mN·m the approach is 1e-6 mm.
 #[test]
-fn under_the_lightest_loads_corners_leave_fewer_digits_and_the_answer_says_how_few() {
+fn lightest_corner_loads_report_their_lost_digits() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Ellipse { semi_major_mm: 37.925807356426894, semi_minor_mm: 37.83643056865192 },
         teeth: 232,
@@ -698,9 +700,9 @@ fn under_the_lightest_loads_corners_leave_fewer_digits_and_the_answer_says_how_f
     assert!(residuals.iter().all(|&residual| residual < 1e-7), "{residuals:?}");
 }
 
-/// What that rounding bends is no curve to be looked at ever nearer: the peaks are those of many intervals, as near as both know them.
+/// The sweep must not refine rounding noise. Its peaks are those of a dense sweep, within their accuracy.
 #[test]
-fn under_the_lightest_loads_corners_leave_the_extremes_as_many_digits_as_they_have() {
+fn lightest_corner_loads_keep_accurate_extremes() {
     let bored = DriveParameters { tip_radius_mm: Some(53.2), ..PAPER_5_2 };
     for (parameters, torque_nm) in [(bored, 1e-5), (bored, 1e-6), (PAPER_5_2, 1e-3), (PAPER_5_2, 1e-4)] {
         let of = LoadParameters { law: ContactLaw::Linear, ring_teeth_bend: false, ..pressed_corners(torque_nm) };
@@ -715,16 +717,16 @@ fn under_the_lightest_loads_corners_leave_the_extremes_as_many_digits_as_they_ha
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Who is helped turns less far: of any drive, senses and bores of all kinds, and the sweep's own checks hold.
+    /// Covers any drive, both senses of rotation and all bores, with the checks of the sweep itself.
     #[test]
-    fn teeth_at_corners_only_ever_help(parameters in any_swept_drive(), bends in any::<bool>(), ln_torque in -6.0_f64..6.0) {
+    fn corner_contact_never_increases_wind_up(parameters in any_swept_drive(), bends in any::<bool>(), ln_torque in -6.0_f64..6.0) {
         let pressed = LoadParameters { ring_teeth_bend: bends, ..pressed_corners(10.0_f64.powf(ln_torque)) };
         let rigid = LoadParameters { corner_contact: false, ..pressed };
         let drive = drive(&parameters);
         let sweeps = [pressed, rigid].map(|load| {
             sweep::sweep(&drive, &LoadCase::new(&load).unwrap(), Points::samples(20).unwrap(), &Never)
         });
-        // What bends too wide for Johnson's law is refused.
+        // Bending teeth may exceed Johnson's law and are then refused.
         if let [Ok(pressed), Ok(rigid)] = sweeps {
             prop_assert!(pressed.states.len() >= rigid.states.len());
             prop_assert_eq!(pressed.mesh.coincidence_degree(), rigid.mesh.coincidence_degree());
@@ -740,9 +742,8 @@ proptest! {
     }
 }
 
-/// At the capacity, as the sweep there finds it, the largest stress is the allowable one.
 #[test]
-fn the_torque_that_corners_help_to_bear_makes_the_allowable_stress() {
+fn capacity_with_corners_reaches_allowable_stress() {
     let allowable = LoadParameters { allowable_stress_mpa: Some(PerContact::of(|_| 900.0)), ..pressed_corners(3.0) };
     let capacity_nm = swept(&PAPER_5_2, &allowable, 60).torque_capacity.unwrap().input_torque_nm;
     let peaks = swept(&PAPER_5_2, &pressed_corners(capacity_nm), 60).peaks;
@@ -750,9 +751,9 @@ fn the_torque_that_corners_help_to_bear_makes_the_allowable_stress() {
     assert!((largest_mpa / 900.0 - 1.0).abs() < 1e-9, "{largest_mpa} MPa");
 }
 
-/// Deviations list every tooth by itself; of nothing but a tooth that is thinner by nothing worth speaking of they change nothing.
+/// With deviations, every tooth is listed by itself.
 #[test]
-fn items_that_hardly_deviate_carry_what_alike_ones_do() {
+fn vanishing_deviation_changes_no_corner_load() {
     let deviations = Deviations { tooth_radius_um: [vec![1e-9], vec![0.0; 39]].concat(), ..Deviations::default() };
     let (drive, load) = (drive(&PAPER_5_2), LoadCase::new(&pressed_corners(3.0)).unwrap());
     let points = Points::samples(12).unwrap();
@@ -764,9 +765,9 @@ fn items_that_hardly_deviate_carry_what_alike_ones_do() {
     }
 }
 
-/// A tooth that cannot spin slips at the corner as its points and those of the ring move: by differences of where they are.
+/// The test takes differences of positions for a tooth that cannot spin.
 #[test]
-fn a_tooth_slips_over_the_corner_as_the_points_of_both_move() {
+fn corner_slip_follows_motion_of_contact_points() {
     let flats = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 0.5 };
     for ring_teeth in [78, 82] {
         let parameters = DriveParameters { tooth: flats, ring_teeth, ..PAPER_5_2 };
@@ -786,7 +787,8 @@ fn a_tooth_slips_over_the_corner_as_the_points_of_both_move() {
                 let position = Position::from_lobe(position_deg.to_radians(), 2);
                 drive.flank().locus().at(position).unwrap().center_radius_mm
             };
-            // A radian of the wave generator against the carrier brings the tooth a radian nearer to the lobe, and turns the ring by -s/k.
+            // If the wave generator turns by a radian against the carrier, the tooth comes a radian nearer to the lobe
+            // and the ring turns by -s/k.
             let step_deg = 1e-4;
             let lift = center_mm(states.position_deg[at] - step_deg) - center_mm(states.position_deg[at] + step_deg);
             let outward = lift / (2.0 * step_deg).to_radians();

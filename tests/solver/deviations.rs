@@ -1,5 +1,5 @@
-//! Sweeps of drives of which single items deviate, against a calculation of their own: teeth placed by angles, each a chain of springs with the
-//! gaps of its slot, its ring space and its lobe, and one rotation found by halving.
+//! Sweeps with deviations against an independent calculation. It places teeth by angles, each a chain of springs with
+//! the gaps of its slot, ring space and lobe, and finds the rotation by bisection.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -32,7 +32,7 @@ fn of(wave_generator: WaveGenerator, teeth: i64, installed: i64, ring_teeth: i64
     }
 }
 
-/// One lobe and more, zones alike and not, both senses, every slot filled and every second; flanks that end at the tip, and before it.
+/// Returns drives of one or more lobes: alike and unlike zones, both senses, full and half-filled slots, any flank end.
 pub(crate) fn drives() -> Vec<DriveParameters> {
     let harmonic =
         |lobes, mean_radius_mm, amplitude_mm| WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm };
@@ -49,7 +49,7 @@ pub(crate) fn drives() -> Vec<DriveParameters> {
     ]
 }
 
-/// Numbers that seem to be at random, between -1 and 1.
+/// Returns a generator of pseudo-random numbers between -1 and 1.
 fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
@@ -59,7 +59,7 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Which kinds of item deviate.
+/// The kinds of items that deviate.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Kinds {
     pub(crate) slots: bool,
@@ -81,7 +81,7 @@ fn count(of: i64) -> usize {
     usize::try_from(of).unwrap()
 }
 
-/// Every deviation of the kinds, some micrometres large.
+/// Returns deviations of these kinds, some micrometres large.
 pub(crate) fn deviations(p: &DriveParameters, kinds: Kinds, seed: u64) -> Deviations {
     let mut random = random(seed);
     let mut list = |is_wanted: bool, items: i64, size: f64| {
@@ -106,7 +106,7 @@ pub(crate) fn deviations(p: &DriveParameters, kinds: Kinds, seed: u64) -> Deviat
     found
 }
 
-/// What covers them.
+/// Returns a load with clearances that cover the deviations.
 pub(crate) fn cleared(torque_nm: f64, law: ContactLaw) -> LoadParameters {
     LoadParameters {
         law,
@@ -124,11 +124,11 @@ pub(crate) fn swept_with(
     sweep::sweep_with_deviations(drive, &LoadCase::new(load).unwrap(), deviations, points, &Never)
 }
 
-/// A tooth as angles place it: no whole number of the solver's is used.
+/// A tooth placed by angles, without the solver's integers.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     slot: u64,
-    /// Lobe, ring space.
+    /// Lobe that the tooth is on.
     lobe: u64,
     ring_space: u64,
     position_rad: f64,
@@ -139,7 +139,7 @@ const fn whole(value: f64) -> u64 {
     value as u64
 }
 
-/// All teeth between a lobe and the valley ahead of it, with the lobe that each is on, when the input has turned.
+/// Returns all teeth between a lobe and the next valley, with their lobes, after an input rotation.
 fn placed_by_angles(p: &DriveParameters, input_rad: f64) -> Vec<Placed> {
     let lobes = p.wave_generator.lobes() as f64;
     let s = if p.teeth > p.ring_teeth { 1.0 } else { -1.0 };
@@ -154,7 +154,7 @@ fn placed_by_angles(p: &DriveParameters, input_rad: f64) -> Vec<Placed> {
         if position_rad < 1e-9 {
             continue;
         }
-        // The middle of the space lies where the tooth would stand at the root.
+        // The middle of the space is the tooth's place at the root.
         let middle = in_ring + s * position_rad * lobes / p.ring_teeth as f64;
         let space = (middle * p.ring_teeth as f64 / (2.0 * PI)).round();
         assert!((space - middle * p.ring_teeth as f64 / (2.0 * PI)).abs() < 1e-6, "{p:?}");
@@ -168,7 +168,7 @@ fn placed_by_angles(p: &DriveParameters, input_rad: f64) -> Vec<Placed> {
     placed
 }
 
-/// `h`, `h'` of the support function.
+/// Returns `h` and `h'` of the support function.
 fn support(p: &DriveParameters, normal_rad: f64) -> (f64, f64) {
     let (sin, cos) = normal_rad.sin_cos();
     match p.wave_generator {
@@ -187,7 +187,7 @@ fn support(p: &DriveParameters, normal_rad: f64) -> (f64, f64) {
     }
 }
 
-/// A tooth as a chain of springs: travel arm, total gap, force ratios, direction of the wave generator's normal in its frame.
+/// A tooth as a chain of springs: travel arm, total gap, force ratios and direction of the wave generator's normal.
 struct Chain {
     placed: Placed,
     arm_mm: f64,
@@ -204,7 +204,7 @@ fn chain(p: &DriveParameters, load: &LoadParameters, deviations: &Deviations, pl
     let lobes = p.wave_generator.lobes() as f64;
     let s = if p.teeth > p.ring_teeth { 1.0 } else { -1.0 };
     let r = p.tooth_radius_mm;
-    // The normal at which the tooth's centre stands at its position, by halving: the centre lags its normal.
+    // Finds the normal for the tooth's position by bisection: the centre lags its normal.
     let (mut low, mut high) = (0.0, PI / lobes);
     for _ in 0..100 {
         let middle: f64 = 0.5 * (low + high);
@@ -245,7 +245,7 @@ fn chain(p: &DriveParameters, load: &LoadParameters, deviations: &Deviations, pl
     Chain { placed, arm_mm: d * gamma.sin(), gap_mm, ratio, normal_rad: in_cam }
 }
 
-/// How far the wave generator turns before the first of all teeth between lobe and flank has closed its gaps, when the input has turned.
+/// Returns the input rotation at which the first tooth between lobe and flank end has closed its gaps.
 pub(crate) fn first_closing_rad(
     p: &DriveParameters,
     load: &LoadParameters,
@@ -258,7 +258,7 @@ pub(crate) fn first_closing_rad(
     chains.map(|chain| chain.gap_mm / chain.arm_mm).fold(f64::INFINITY, f64::min)
 }
 
-/// `F_H` of each chain when the wave generator has turned by `rotation_rad`.
+/// Returns `F_H` of each chain after a rotation of the wave generator.
 fn forces_n(chains: &[Chain], law: &ContactLaw, width_mm: f64, rotation_rad: f64) -> Vec<f64> {
     chains
         .iter()
@@ -282,7 +282,7 @@ fn forces_n(chains: &[Chain], law: &ContactLaw, width_mm: f64, rotation_rad: f64
         .collect()
 }
 
-/// The rotation that makes the torque, by halving.
+/// Finds the rotation for a torque by bisection.
 fn rotation_rad(chains: &[Chain], law: &ContactLaw, width_mm: f64, torque_nmm: f64) -> f64 {
     let (mut low, mut high) = (0.0, 10.0);
     for _ in 0..200 {
@@ -295,7 +295,7 @@ fn rotation_rad(chains: &[Chain], law: &ContactLaw, width_mm: f64, torque_nmm: f
 }
 
 #[test]
-fn every_state_of_a_sweep_with_deviations_is_that_of_free_teeth_on_springs() {
+fn deviation_states_match_free_teeth_on_springs() {
     let mut worst = 0.0_f64;
     for (index, p) in drives().iter().enumerate() {
         for (kinds, law) in ALL_KINDS.into_iter().zip([FIXED, ContactLaw::Palmgren].into_iter().cycle()) {
@@ -341,13 +341,13 @@ fn every_state_of_a_sweep_with_deviations_is_that_of_free_teeth_on_springs() {
     assert!(worst < 1e-12, "{worst:e}");
 }
 
-/// Where a tooth stands, and its slot, ring space and lobe as far as they are wanted.
+/// A tooth's position with its slot, ring space and lobe if these are compared.
 type Items = (u64, Option<u64>, Option<u64>, Option<u64>);
 
-/// Which items stand together, as far as they deviate: for every slot where it stands on its lobe, and what is where.
+/// Returns the combinations of deviating items: each slot's position on its lobe, with its items.
 fn pattern(p: &DriveParameters, kinds: Kinds, load_periods: u64) -> BTreeSet<Items> {
     let removal = (p.teeth / p.installed) as f64;
-    // A quarter of the way, so that none stands at a lobe or in a valley.
+    // An angle at a quarter, so that no tooth is at a lobe or in a valley.
     let input_rad = (load_periods as f64 + 0.26) * 2.0 * PI * removal / p.ring_teeth as f64;
     let found = placed_by_angles(p, input_rad);
     let of = |is_wanted: bool, item: u64| is_wanted.then_some(item);
@@ -359,7 +359,7 @@ fn pattern(p: &DriveParameters, kinds: Kinds, load_periods: u64) -> BTreeSet<Ite
 }
 
 #[test]
-fn a_sweep_with_deviations_ends_where_the_items_that_deviate_meet_again_and_no_sooner() {
+fn deviation_sweep_ends_when_pattern_repeats() {
     for p in drives() {
         let drive = drive(&p);
         for kinds in ALL_KINDS {
@@ -373,9 +373,9 @@ fn a_sweep_with_deviations_ends_where_the_items_that_deviate_meet_again_and_no_s
     }
 }
 
-/// Each of the laps, slots by spaces, was once laid out before any was counted: gigabytes, and no stop was looked at.
+/// Listing all laps, slots by spaces, would take gigabytes.
 #[test]
-fn a_sweep_to_a_tolerance_of_sixteen_million_unlike_laps_is_refused_before_they_are_gone_through() {
+fn sixteen_million_laps_are_refused_at_once() {
     let p = of(ellipse(15_996.0, 15_995.0), 3999, 3999, 3997, 2.0);
     let unlike = |count: u32| (0..count).map(|item| f64::from(item % 7)).collect();
     let deviations = Deviations { slot_wall_um: unlike(3999), ring_space_um: unlike(3997), ..Deviations::default() };
@@ -387,7 +387,7 @@ fn a_sweep_to_a_tolerance_of_sixteen_million_unlike_laps_is_refused_before_they_
 }
 
 #[test]
-fn what_deviates_by_nothing_is_swept_as_one_zone_that_stands_for_all() {
+fn zero_deviations_sweep_one_zone() {
     let drive = drive(&PAPER_5_1);
     let nothing = Deviations {
         slot_wall_um: vec![0.0; 28],
@@ -401,7 +401,7 @@ fn what_deviates_by_nothing_is_swept_as_one_zone_that_stands_for_all() {
 }
 
 #[test]
-fn what_all_items_have_alike_is_a_modification() {
+fn equal_deviation_of_all_items_is_modification() {
     let drives = [PAPER_5_1, of(ellipse(58.0, 56.6), 13, 13, 15, 5.0), PAPER_5_2_BORED];
     for (p, moves) in drives.into_iter().flat_map(|p| [(p, false), (p, true)]) {
         let drive = drive(&p);
@@ -430,7 +430,7 @@ fn what_all_items_have_alike_is_a_modification() {
         };
         let alike = swept(&p, &modified, 4);
         let told_apart = swept_with(&drive, &torque, &deviating, Points::samples(4).unwrap()).unwrap();
-        // One load period after the other, and in each as many teeth in every zone.
+        // Load periods follow each other, each with as many teeth in every zone.
         let angles = alike.input_angles.input_angle_deg.len() - 1;
         for (angle, wind_up_deg) in told_apart.input_angles.wind_up_deg.iter().enumerate() {
             let expected_deg = alike.input_angles.wind_up_deg[angle % angles];
@@ -444,7 +444,7 @@ fn what_all_items_have_alike_is_a_modification() {
         let zones = alike.mesh.zones_in_torque();
         let whole = f64::from(alike.input_angles.loaded_teeth[1]) * zones;
         assert_eq!(f64::from(told_apart.input_angles.loaded_teeth[1]), whole);
-        // Losses follow, whichever way the zones are listed.
+        // Losses are the same for either listing of zones.
         let friction = Friction::new(&FrictionParameters {
             wave_generator: WaveGeneratorFriction::Plain { coefficient: 0.02 },
             ring_coefficient: 0.05,
@@ -463,12 +463,12 @@ fn turned_by(list: &[f64], items: usize) -> Vec<f64> {
 }
 
 #[test]
-fn lists_that_begin_a_slot_and_m_spaces_later_are_the_drive_a_load_period_later() {
+fn rotated_lists_shift_sweep_by_a_load_period() {
     let p = of(ellipse(58.0, 56.0), 24, 12, 22, 5.0);
     let drive = drive(&p);
     let load = cleared(20.0, FIXED);
     let mut from_0 = deviations(&p, ALL_KINDS[6], 5);
-    // A direction cannot be turned by whole items in every part.
+    // A runout's direction cannot be rotated by whole items of every part.
     from_0.runout = PerContact::default();
     let from_1 = Deviations {
         tooth_radius_um: turned_by(&from_0.tooth_radius_um, 1),
@@ -489,8 +489,8 @@ fn lists_that_begin_a_slot_and_m_spaces_later_are_the_drive_a_load_period_later(
 }
 
 #[test]
-fn an_eccentric_off_its_axis_is_one_of_another_eccentricity() {
-    // The circle itself, moved: distance of the tooth's centre from its middle, less both radii.
+fn eccentric_off_axis_has_another_eccentricity() {
+    // The moved circle: distance of the tooth's centre from its middle, minus both radii.
     let eccentric = |eccentricity_mm| WaveGenerator::Eccentric { radius_mm: 30.0, eccentricity_mm };
     let p = of(eccentric(1.0), 12, 12, 11, 4.0);
     let none = cleared(20.0, FIXED);
@@ -510,7 +510,7 @@ fn an_eccentric_off_its_axis_is_one_of_another_eccentricity() {
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_finds_the_peaks_of_every_load_period() {
+fn tolerance_sweep_finds_peaks_of_all_load_periods() {
     for (index, p) in drives().iter().enumerate() {
         let drive = drive(p);
         let load =
@@ -535,7 +535,7 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_every_load_period() {
             for (fine, found) in pairs.chain(wind_ups).chain(capacities) {
                 let beyond = (found - fine) / fine.abs();
                 assert!(beyond > -1e-6, "{found} misses {fine}: {p:?} {kinds:?}");
-                // The samples themselves miss the peaks by a little.
+                // The samples miss the peaks by a little.
                 assert!(beyond < 1e-2, "{found} is far above {fine}: {p:?} {kinds:?}");
             }
             let (first, last) = (found.states.input_angle_deg[0], found.states.input_angle_deg[found.states.len() - 1]);
@@ -545,7 +545,7 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_every_load_period() {
 }
 
 #[test]
-fn where_all_items_have_alike_a_tolerance_finds_in_every_load_period_what_it_finds_in_one() {
+fn equal_deviations_have_peaks_of_one_period() {
     for p in [of(ellipse(58.0, 56.0), 14, 14, 12, 5.0), of(ellipse(58.0, 56.6), 13, 13, 15, 5.0), PAPER_5_2_BORED] {
         let drive = drive(&p);
         let torque = cleared(20.0, ContactLaw::Palmgren);
@@ -564,7 +564,7 @@ fn where_all_items_have_alike_a_tolerance_finds_in_every_load_period_what_it_fin
 }
 
 #[test]
-fn unlike_teeth_push_the_wave_generator_aside_with_the_sum_of_their_forces() {
+fn radial_force_of_unlike_teeth_is_their_sum() {
     for p in [of(ellipse(58.0, 56.0), 14, 14, 12, 5.0), of(ellipse(58.0, 56.0), 14, 14, 16, 5.0)] {
         let drive = drive(&p);
         let load = cleared(60.0, FIXED);
@@ -586,14 +586,14 @@ fn unlike_teeth_push_the_wave_generator_aside_with_the_sum_of_their_forces() {
             assert!(turned.min(360.0 - turned) < 1e-6);
             assert!(forces.force_n[angle] > 1e-3 * all);
         }
-        // Where the zones are alike there is nothing.
+        // Alike zones have no radial force.
         let alike = sweep::sweep(&drive, &case, Points::samples(2).unwrap(), &Never).unwrap();
         assert_eq!(RadialForces::of(&drive, &case, &Deviations::default(), &alike, &Never).unwrap(), None);
     }
 }
 
 #[test]
-fn a_part_too_full_is_told_with_its_slot_its_lobe_and_the_input_angle() {
+fn interference_names_slot_lobe_and_input_angle() {
     let drive = drive(&PAPER_5_1);
     let mut walls = vec![0.0; 28];
     // A gap of 8 µm at each contact is 16 µm at the root at least.
@@ -616,7 +616,7 @@ fn a_part_too_full_is_told_with_its_slot_its_lobe_and_the_input_angle() {
 }
 
 #[test]
-fn deviations_that_this_load_or_this_drive_cannot_have_are_all_told() {
+fn reports_all_impossible_deviations() {
     let drive = drive(&PAPER_5_1);
     let wrong = Deviations {
         slot_wall_um: vec![1.0; 27],
@@ -629,18 +629,18 @@ fn deviations_that_this_load_or_this_drive_cannot_have_are_all_told() {
     assert!(violations.iter().any(counted), "{violations:?}");
     assert!(violations.contains(&Violation::NeedsVirtualWork { parameter: Parameter::Deviations }));
     assert_eq!(violations.len(), 4, "{violations:?}");
-    // What is nil has to fit too.
+    // Zero deviations need the right length too.
     let nil = Deviations { slot_wall_um: vec![0.0; 27], ..Deviations::default() };
     let refused = swept_with(&drive, &load(20.0, Projection), &nil, Points::samples(4).unwrap()).unwrap_err();
     assert!(matches!(refused, SolveError::Impossible(violations) if violations.len() == 1));
 }
 
 #[test]
-fn the_wind_up_without_load_is_that_of_a_torque_that_goes_to_nothing() {
+fn unloaded_wind_up_is_limit_of_small_torque() {
     for p in drives() {
         let drive = drive(&p);
         let deviations = deviations(&p, ALL_KINDS[4], 11);
-        // Teeth of both zones, teeth of one zone, and both to a tolerance, where loads jump and angles stand twice.
+        // Cases: teeth of both zones, teeth of one zone, and a tolerance sweep with jumps at double angles.
         for (deviations, points) in [
             (&deviations, Points::samples(5).unwrap()),
             (&Deviations::default(), Points::samples(5).unwrap()),

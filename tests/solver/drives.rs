@@ -1,4 +1,4 @@
-//! Drives and loads that many tests speak of.
+//! Drives and loads that many tests share.
 
 use proptest::prelude::*;
 use toothwave_solver::mesh::Mesh;
@@ -9,7 +9,7 @@ use toothwave_solver::{
     sweep::{self, Points, Sweep},
 };
 
-/// So many cases of a property, or fewer where `PROPTEST_CASES` says so; none is written down.
+/// Returns a configuration with this many cases, or fewer by `PROPTEST_CASES`. Failures are not persisted.
 pub(crate) fn cases(most: u32) -> ProptestConfig {
     let asked = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok());
     let cases = asked.map_or(most, |asked: u32| asked.min(most));
@@ -20,7 +20,7 @@ pub(crate) const fn ellipse(semi_major_mm: f64, semi_minor_mm: f64) -> WaveGener
     WaveGenerator::Ellipse { semi_major_mm, semi_minor_mm }
 }
 
-/// The semi-axes of an elliptic drive.
+/// Returns the semi-axes of an elliptic drive.
 pub(crate) fn semi_axes_mm(parameters: &DriveParameters) -> (f64, f64) {
     match parameters.wave_generator {
         WaveGenerator::Ellipse { semi_major_mm, semi_minor_mm } => (semi_major_mm, semi_minor_mm),
@@ -53,7 +53,7 @@ pub(crate) const PAPER_5_2: DriveParameters = DriveParameters {
 /// Case 5.2 with the bore that reproduces the paper's figures 20-25.
 pub(crate) const PAPER_5_2_BORED: DriveParameters = DriveParameters { tip_radius_mm: Some(52.8227), ..PAPER_5_2 };
 
-/// One of one lobe, which was held against finite elements as the paper's cases were.
+/// A drive with one lobe, compared with finite elements like the paper's cases.
 pub(crate) const ECCENTRIC: DriveParameters = DriveParameters {
     wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
     teeth: 20,
@@ -68,7 +68,7 @@ pub(crate) fn drive(parameters: &DriveParameters) -> Drive {
     Drive::new(parameters).expect("a possible drive")
 }
 
-/// Steel throughout, linear stiffness.
+/// Returns a load with steel throughout and linear stiffness.
 pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParameters {
     LoadParameters {
         materials: Materials {
@@ -91,7 +91,7 @@ pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParamete
     }
 }
 
-/// One number at each contact.
+/// Returns one number for each contact.
 pub(crate) const fn everywhere(value: f64) -> PerContact<f64> {
     PerContact { wave_generator: value, ring: value, carrier: value }
 }
@@ -101,7 +101,7 @@ pub(crate) fn swept(parameters: &DriveParameters, load: &LoadParameters, samples
     sweep::sweep(&drive(parameters), &load, Points::samples(samples).unwrap(), &Never).expect("a solvable sweep")
 }
 
-/// Possible drives of many shapes, swept ones (`always_carries`) among them.
+/// Generates possible drives of many shapes, including ones that can be swept (`always_carries`).
 pub(crate) fn any_drive() -> impl Strategy<Value = DriveParameters> {
     (
         (1.0_f64..3.0).prop_map(|exponent| 10.0_f64.powf(exponent)),
@@ -116,7 +116,7 @@ pub(crate) fn any_drive() -> impl Strategy<Value = DriveParameters> {
             let installed = 2 * half;
             let teeth = installed * removal;
             let semi_minor_mm = a * (1.0 - flattening);
-            // Thick enough to fill that share of the room between neighbours.
+            // Fills this share of the space between neighbours.
             let sin = (std::f64::consts::PI / installed as f64).sin();
             let tooth_radius_mm = thickness * semi_minor_mm * sin / (1.0 - sin);
             let parameters = DriveParameters {
@@ -133,7 +133,7 @@ pub(crate) fn any_drive() -> impl Strategy<Value = DriveParameters> {
         })
 }
 
-/// Those that can be swept.
+/// Generates drives that can be swept.
 pub(crate) fn any_swept_drive() -> impl Strategy<Value = DriveParameters> {
     any_drive()
         .prop_filter("no tooth in mesh at some angle", |parameters| Mesh::new(&drive(parameters)).always_carries())

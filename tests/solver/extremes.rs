@@ -15,7 +15,7 @@ pub(crate) fn cases(group: &str) -> Vec<Case> {
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_finds_the_true_extremes() {
+fn tolerance_sweep_finds_true_extremes() {
     let mut worst = Worst::default();
     for case in cases("extremes") {
         let (name, sweep) = (case.name(), case.sweep().unwrap());
@@ -41,7 +41,7 @@ fn a_sweep_to_a_tolerance_finds_the_true_extremes() {
 }
 
 #[test]
-fn the_contact_at_a_peak_is_as_wide_and_sheared_as_hertz_says() {
+fn peak_contact_has_hertz_width_and_shear() {
     let mut worst = Worst::default();
     for case in cases("extremes") {
         let (name, sweep) = (case.name(), case.sweep().unwrap());
@@ -53,7 +53,8 @@ fn the_contact_at_a_peak_is_as_wide_and_sheared_as_hertz_says() {
                 [("half_width_mm", found.half_width_mm), ("shear_stress_mpa", shear), ("shear_depth_mm", depth)]
             {
                 let value = number(&expected[kind]).unwrap();
-                // The width follows the place of the peak to first order, and the place is known to the root of the tolerance.
+                // The width follows the peak's position to first order. The position's error is the root of the
+                // tolerance.
                 worst.see(kind, &name, (found - value).abs(), 1e-4 * value);
             }
         }
@@ -62,7 +63,7 @@ fn the_contact_at_a_peak_is_as_wide_and_sheared_as_hertz_says() {
 }
 
 #[test]
-fn the_torque_capacity_is_the_torque_under_which_the_allowable_stress_is_reached() {
+fn allowable_stress_is_reached_at_torque_capacity() {
     let mut worst = Worst::default();
     for case in cases("torque-capacity") {
         let (name, expected) = (case.name(), &case.0["expected"]["torque_capacity"]);

@@ -1,4 +1,4 @@
-//! Every kind of wave generator, any number of lobes and of installed teeth, against constructions that share no formula with the solver:
+//! All kinds of wave generators, with any number of lobes and installed teeth, against independent constructions:
 //! supporting lines and circles, differences, swept circles, rational numbers.
 
 use std::f64::consts::PI;
@@ -53,7 +53,7 @@ const fn of(
     }
 }
 
-/// Drives of every kind: one lobe to seven, zones alike and not, regular and undercut, convex and hollow, both senses.
+/// Returns drives of every kind: one to seven lobes, alike and unlike zones, regular and undercut, convex and hollow.
 fn family() -> Vec<DriveParameters> {
     let bored = |parameters: DriveParameters, tip_radius_mm| DriveParameters {
         tip_radius_mm: Some(tip_radius_mm),
@@ -88,7 +88,7 @@ fn family() -> Vec<DriveParameters> {
     ]
 }
 
-/// Any drive of the family that can be swept.
+/// Generates drives of the family that can be swept.
 pub(crate) fn any_of_the_family() -> impl Strategy<Value = DriveParameters> {
     let numbers = (0_usize..4, 1_i64..8, 2_i64..40, 1_i64..4, 0.1_f64..0.8, 0.02_f64..0.9, any::<bool>());
     (numbers, prop::option::of(0.05_f64..1.0)).prop_filter_map(
@@ -117,7 +117,7 @@ pub(crate) fn any_of_the_family() -> impl Strategy<Value = DriveParameters> {
     )
 }
 
-/// A tooth's centre by its place on the cam alone, without the solver: on a line that supports the cam, on the circle, or given.
+/// Returns the distance of a tooth's centre without the solver: by a supporting line, by the circle, or as given.
 fn center_radius_mm(p: &DriveParameters, psi: f64) -> f64 {
     let r = p.tooth_radius_mm;
     let by_support = |support: &dyn Fn(f64) -> (f64, f64), lobes: i64| {
@@ -126,7 +126,7 @@ fn center_radius_mm(p: &DriveParameters, psi: f64) -> f64 {
             let (sin, cos) = phi.sin_cos();
             Vector2::new((h + r) * cos - slope * sin, (h + r) * sin + slope * cos)
         };
-        // The polar angle grows with the normal's; within half a lobe of ψ, so that no turn is lost.
+        // The polar angle grows with the normal's. It stays within half a lobe of ψ, so no turn is lost.
         let (mut low, mut high) = (psi - 0.5 * PI / lobes as f64, psi + 2.0 * PI / lobes as f64);
         for _ in 0..200 {
             let middle = 0.5 * (low + high);
@@ -145,7 +145,7 @@ fn center_radius_mm(p: &DriveParameters, psi: f64) -> f64 {
             2,
         ),
         WaveGenerator::Eccentric { radius_mm, eccentricity_mm: e } => {
-            // The far intersection of a ray from the axis with the circle of radius R0 + r about (e, 0).
+            // The far intersection of a ray from the axis with the circle of radius R0 + r around (e, 0).
             e * psi.cos() + ((radius_mm + r).powi(2) - (e * psi.sin()).powi(2)).sqrt()
         }
         WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm: e } => {
@@ -159,7 +159,7 @@ fn center_radius_mm(p: &DriveParameters, psi: f64) -> f64 {
 }
 
 #[test]
-fn path_slope_and_curvature_are_those_of_differences_on_the_path_itself() {
+fn path_slope_and_curvature_match_differences() {
     for p in family() {
         let drive = drive(&p);
         let (locus, lobes) = (drive.flank().locus(), drive.lobes());
@@ -178,7 +178,7 @@ fn path_slope_and_curvature_are_those_of_differences_on_the_path_itself() {
             let t_psi = -bend / d + t * t;
             let scale = 1.0 + t_psi.abs();
             assert!((tooth.tan_pressure_angle_derivative - t_psi).abs() < 1e-5 * scale, "{t_psi} of {p:?}");
-            // The path's curvature by its polar form, and the cam's as that of a parallel curve.
+            // Curvature of the path in polar form, and of the cam as a parallel curve.
             let path = (d * d + 2.0 * slope * slope - d * bend) / (d * d + slope * slope).powf(1.5);
             let cam = path / (1.0 - p.tooth_radius_mm * path);
             let found = tooth.cam_contact.curvature_per_mm;
@@ -190,8 +190,8 @@ fn path_slope_and_curvature_are_those_of_differences_on_the_path_itself() {
 }
 
 #[test]
-fn a_position_keeps_its_digits_towards_lobe_and_valley() {
-    // Near either end lever arms are proportional to the distance from it: no digit may be lost on the way there.
+fn position_is_accurate_near_lobe_and_valley() {
+    // Near either end, lever arms are proportional to the distance from it and must keep their digits.
     for p in family() {
         let drive = drive(&p);
         let (locus, lobes) = (drive.flank().locus(), drive.lobes());
@@ -208,7 +208,7 @@ fn a_position_keeps_its_digits_towards_lobe_and_valley() {
 }
 
 #[test]
-fn the_steepest_place_is_the_largest_slope_of_a_scan() {
+fn steepest_place_matches_scan() {
     for p in family() {
         let drive = drive(&p);
         let (locus, lobes) = (drive.flank().locus(), drive.lobes());
@@ -238,8 +238,8 @@ fn the_steepest_place_is_the_largest_slope_of_a_scan() {
     }
 }
 
-/// How far from the axis any tooth reaches, over a whole turn, in the direction `angle_rad` of the ring's frame: the ring's path is
-/// `d(kθ)`, scanned and refined, without the solver.
+/// Returns the farthest reach of any tooth in the direction `angle_rad` of the ring's frame, over a whole turn.
+/// It scans and refines the ring's path `d(kθ)` without the solver.
 fn farthest_swept_mm(p: &DriveParameters, angle_rad: f64) -> f64 {
     const SCAN: u32 = 600;
     let r = p.tooth_radius_mm;
@@ -264,7 +264,7 @@ fn farthest_swept_mm(p: &DriveParameters, angle_rad: f64) -> f64 {
 }
 
 #[test]
-fn the_ring_of_every_kind_is_the_boundary_of_the_circles_swept_along_the_path() {
+fn ring_is_boundary_of_swept_circles() {
     for p in family() {
         let drive = drive(&p);
         let flank = drive.flank();
@@ -294,13 +294,13 @@ fn the_ring_of_every_kind_is_the_boundary_of_the_circles_swept_along_the_path() 
 }
 
 #[test]
-fn the_critical_radius_parts_swept_circles_that_reach_the_tip_from_those_that_pass_it() {
+fn critical_radius_separates_undercut_from_regular_tips() {
     let mut tried = 0;
     for p in family() {
         let unbored = DriveParameters { tip_radius_mm: None, ..p };
         let Some(critical_mm) = drive(&unbored).flank().critical_tooth_radius_mm() else { continue };
         let valley_rad = PI / p.wave_generator.lobes() as f64;
-        // How far the union reaches on the tip's line beyond the tooth in the valley itself.
+        // Reach of the union on the tip's line beyond the tooth in the valley.
         let beyond_mm = |factor: f64| {
             let thicker = DriveParameters { tooth_radius_mm: critical_mm * factor, ..unbored };
             let regular_mm = center_radius_mm(&thicker, valley_rad) + thicker.tooth_radius_mm;
@@ -320,9 +320,9 @@ fn the_critical_radius_parts_swept_circles_that_reach_the_tip_from_those_that_pa
     assert!(tried > 10, "{tried}");
 }
 
-/// The lower root of theory 2.9, and that an undercut drive has one below its own radius.
+/// Theory 2.9. An undercut drive has a root below its own radius.
 #[test]
-fn the_critical_radius_of_a_harmonic_cam_is_the_lower_root_of_its_quadratic() {
+fn harmonic_critical_radius_is_lower_quadratic_root() {
     let mut undercut = 0;
     for (lobes, teeth, radius_mm, e) in [(1, 40, 57.0, 1.0), (2, 80, 57.0, 1.0), (3, 36, 48.0, 1.0), (4, 48, 60.0, 1.2)]
     {
@@ -340,9 +340,9 @@ fn the_critical_radius_of_a_harmonic_cam_is_the_lower_root_of_its_quadratic() {
     assert!(undercut > 1, "{undercut}");
 }
 
-/// The digits of a bore are those of its distance from the tip or the root: near either the position keeps as many.
+/// The position keeps as many digits as the bore's distance from tip or root has.
 #[test]
-fn a_bore_next_to_tip_or_root_of_a_harmonic_cams_ring_ends_the_flank_where_its_radius_is_reached() {
+fn harmonic_bore_is_accurate_near_tip_and_root() {
     for (lobes, teeth) in [(1, 30), (2, 28), (3, 36), (5, 50)] {
         let drive = drive(&of(harmonic(lobes, 57.0, 1.0), teeth, 2, teeth - lobes, 2.5));
         let flank = drive.flank();
@@ -358,7 +358,7 @@ fn a_bore_next_to_tip_or_root_of_a_harmonic_cams_ring_ends_the_flank_where_its_r
 }
 
 #[test]
-fn one_lobe_of_the_harmonic_cam_is_the_eccentric_circle_to_the_last_bit() {
+fn one_lobe_harmonic_cam_is_exact_eccentric() {
     for (teeth, ring_teeth) in [(20, 21), (21, 20)] {
         let circle = of(eccentric(30.8, 1.2), teeth, teeth, ring_teeth, 2.5);
         let support = of(harmonic(1, 30.8, 1.2), teeth, teeth, ring_teeth, 2.5);
@@ -370,7 +370,7 @@ fn one_lobe_of_the_harmonic_cam_is_the_eccentric_circle_to_the_last_bit() {
 }
 
 #[test]
-fn a_harmonic_cam_of_two_lobes_differs_from_the_ellipse_by_the_square_of_its_amplitude() {
+fn two_lobe_harmonic_cam_approaches_ellipse_quadratically() {
     let difference_mm = |e: f64| {
         let (one, other) =
             (of(harmonic(2, 57.0, e), 28, 28, 26, 5.0), of(ellipse(57.0 + e, 57.0 - e), 28, 28, 26, 5.0));
@@ -387,7 +387,7 @@ fn a_harmonic_cam_of_two_lobes_differs_from_the_ellipse_by_the_square_of_its_amp
 }
 
 #[test]
-fn as_the_stroke_goes_to_nothing_every_kind_becomes_a_circle() {
+fn small_stroke_makes_every_kind_a_circle() {
     let e = 1e-6;
     for (wave_generator, teeth, radius_mm) in [
         (eccentric(40.0, e), 21, 43.0),
@@ -419,7 +419,7 @@ fn case(compatibility: toothwave_solver::Compatibility) -> LoadCase {
     LoadCase::new(&load(7.0, compatibility)).unwrap()
 }
 
-/// The teeth in mesh at a sample by fractions of a turn, in whole numbers: slot and lobe.
+/// Returns slot and lobe of the teeth in mesh at a sample, by fractions of a turn in whole numbers.
 fn in_mesh_by_fractions(installed: i64, lobes: i64, sample: i64, samples: i64, reach: (i64, i64)) -> Vec<(u64, u32)> {
     let mut found = Vec::new();
     for slot in 0..installed {
@@ -439,7 +439,7 @@ fn in_mesh_by_fractions(installed: i64, lobes: i64, sample: i64, samples: i64, r
 }
 
 #[test]
-fn teeth_in_mesh_are_those_that_fractions_of_a_turn_find() {
+fn teeth_in_mesh_match_exact_fractions() {
     for (lobes, teeth, installed) in [
         (1, 20, 20),
         (1, 21, 7),
@@ -491,7 +491,7 @@ fn teeth_in_mesh_are_those_that_fractions_of_a_turn_find() {
 }
 
 #[test]
-fn a_cut_short_flank_takes_the_teeth_that_stand_on_it() {
+fn shortened_flank_counts_the_teeth_on_it() {
     for p in family() {
         let drive = drive(&p);
         let mesh = Mesh::new(&drive);
@@ -522,20 +522,20 @@ fn a_cut_short_flank_takes_the_teeth_that_stand_on_it() {
 }
 
 #[test]
-fn a_tooth_is_always_in_mesh_where_the_flank_spans_more_than_a_place() {
+fn always_carries_matches_brute_force() {
     let mut refused = 0;
     for lobes in 1..=6 {
         for installed in 2..30 {
             let p = of(harmonic(lobes, 100.0, 0.3), installed, installed, installed + lobes, 3.0);
             let Ok(drive) = Drive::new(&p) else { continue };
             let mesh = Mesh::new(&drive);
-            // By brute force over many moments, none of them an entry: is there one without a tooth that has a lever arm?
+            // Brute force over many moments, none of them an entry: is there a moment without a tooth with a lever arm?
             let carries = (0..840).all(|sample| {
                 (0..installed).any(|slot| {
                     let place = (slot * 840 - sample) * lobes;
                     let turn = 840 * installed;
                     let from_lobe = (place.rem_euclid(turn) + turn / 2 - 1) % turn - turn / 2 + 1;
-                    // In the valley there is no lever arm either.
+                    // In the valley there is no lever arm.
                     from_lobe > 0 && 2 * from_lobe < turn
                 })
             });
@@ -550,7 +550,7 @@ proptest! {
     #![proptest_config(cases(192))]
 
     #[test]
-    fn loads_of_every_kind_agree_with_dense_solves(parameters in any_of_the_family()) {
+    fn loads_of_every_kind_match_dense_solves(parameters in any_of_the_family()) {
         prop_assert!(worst_difference(&parameters, Projection, EQUAL) < 1e-9);
         prop_assert!(worst_difference(&parameters, VirtualWork, UNEQUAL) < 1e-9);
     }
@@ -568,7 +568,7 @@ proptest! {
     }
 
     #[test]
-    fn a_sweep_to_a_tolerance_sees_what_many_samples_see(parameters in any_of_the_family()) {
+    fn tolerance_sweep_matches_many_samples(parameters in any_of_the_family()) {
         let drive = drive(&parameters);
         let to_tolerance = Points::tolerance(1e-4, 1_000_000).unwrap();
         let adaptive = sweep::sweep(&drive, &case(VirtualWork), to_tolerance, &Never).unwrap();
@@ -579,14 +579,14 @@ proptest! {
             let dense = dense.peaks.get(contact);
             prop_assert!(peaks.force_n.value >= dense.force_n.value * (1.0 - 1e-4), "{:?}", contact);
             prop_assert!(peaks.stress_mpa.value >= dense.stress_mpa.value * (1.0 - 1e-4), "{:?}", contact);
-            // What lies between two of the samples is not much more, but where a tooth may stand alone just off the lobe.
+            // Between samples values are hardly larger, except where a tooth is alone just off the lobe.
             let is_steady = Mesh::new(&drive).engaged_spacings() > 2.5;
             prop_assert!(!is_steady || peaks.force_n.value <= dense.force_n.value * 1.1, "{:?}", contact);
         }
     }
 
     #[test]
-    fn the_wave_generators_outline_is_a_radius_inside_the_path(parameters in any_of_the_family(), place in 0.0_f64..1.0) {
+    fn wave_generator_outline_is_inner_offset_of_path(parameters in any_of_the_family(), place in 0.0_f64..1.0) {
         let drive = drive(&parameters);
         let request = ProfileParameters { chord_tolerance_mm: 1e-3, extent: Extent::Full, max_points: 1_000_000 };
         let outline = profiles(&drive, &request, &Never).unwrap().wave_generator;
@@ -601,7 +601,7 @@ proptest! {
             prop_assert!(radius_mm < locus.cam_outer_radius_mm() * (1.0 + 1e-12));
             prop_assert!(radius_mm > locus.cam_inner_radius_mm() * (1.0 - 1e-12));
         }
-        // No point comes nearer to a tooth's centre than its radius, and some touch it.
+        // Every point keeps a radius from every tooth's centre, and some touch it.
         let psi = 2.0 * PI * place;
         let d = center_radius_mm(&parameters, psi);
         let center = Point2::new(d * psi.cos(), d * psi.sin());
@@ -634,7 +634,7 @@ fn forces(p: &DriveParameters, sample: u64, samples: u64) -> (Vector2<f64>, f64,
     (Mechanism::of(&drive).radial_force_n(&loads), sum_n, loaded.input_torque_nmm())
 }
 
-/// The sum of the forces at the cam, along the lines from the circle's centre to the teeth's centres.
+/// Returns the sum of the forces at the cam along the lines from the circle's centre to the teeth's centres.
 fn along_normals_n(p: &DriveParameters, sample: u64, samples: u64, circle: Vector2<f64>) -> Vector2<f64> {
     let states = swept(p, &load(7.0, VirtualWork), samples).states;
     let angle_deg = Mesh::new(&drive(p)).input_angle_deg(sample, Samples::new(samples).unwrap());
@@ -646,14 +646,14 @@ fn along_normals_n(p: &DriveParameters, sample: u64, samples: u64, circle: Vecto
 }
 
 #[test]
-fn an_eccentric_cam_is_pushed_across_its_eccentricity_by_the_torque_over_it() {
+fn eccentric_radial_force_is_torque_over_eccentricity() {
     for p in [of(eccentric(30.8, 1.2), 20, 20, 21, 3.0), of(eccentric(20.0, 2.0), 16, 8, 15, 2.5)] {
         for sample in 0..5 {
             let (force_n, sum_n, torque_nmm) = forces(&p, sample, 5);
             let WaveGenerator::Eccentric { eccentricity_mm, .. } = p.wave_generator else { panic!("{p:?}") };
             let across_n = -torque_nmm / eccentricity_mm;
             assert!((force_n.y - across_n).abs() < 1e-12 * across_n.abs(), "{} is not {across_n}", force_n.y);
-            // All normals meet in the centre of the circle.
+            // All normals meet at the circle's centre.
             let pushed_n = along_normals_n(&p, sample, 5, Vector2::new(eccentricity_mm, 0.0));
             assert!((force_n + pushed_n).norm() < 1e-11 * sum_n, "{force_n} is not {}", -pushed_n);
         }
@@ -661,11 +661,11 @@ fn an_eccentric_cam_is_pushed_across_its_eccentricity_by_the_torque_over_it() {
 }
 
 #[test]
-fn lobes_that_are_loaded_alike_push_the_wave_generator_nowhere_and_others_do() {
+fn only_unequally_loaded_lobes_have_radial_force() {
     for p in [of(harmonic(4, 60.0, 1.2), 36, 18, 40, 4.0), of(harmonic(3, 48.0, 1.0), 30, 30, 27, 4.0), PAPER_5_1] {
         assert_eq!(forces(&p, 1, 5).0, Vector2::zeros());
     }
-    // The sum over all lobes, where it is taken and not known: two of the four lobes are alike.
+    // The sum over all lobes, calculated and not assumed: two of the four lobes are alike.
     let p = of(harmonic(4, 60.0, 1.2), 36, 18, 40, 4.0);
     let drive = drive(&p);
     let mesh = Mesh::new(&drive);
@@ -689,9 +689,9 @@ fn violations(p: &DriveParameters) -> Vec<Violation> {
     }
 }
 
-/// Of a path that is given: all its centres are as far from all of the cam as a tooth is thick, or the cam is none.
+/// On a given path, every centre keeps the tooth's radius from the whole cam, or the cam is refused.
 #[test]
-fn the_flanks_of_a_lobe_do_not_meet_however_large_the_stroke() {
+fn flanks_of_lobe_do_not_meet() {
     let mut are_hollow = 0;
     for lobes in [2, 3, 4, 7, 12] {
         for tooth_radius_mm in [0.1, 0.3, 0.6, 1.2] {
@@ -705,9 +705,9 @@ fn the_flanks_of_a_lobe_do_not_meet_however_large_the_stroke() {
             };
             let (_, least_mm) = of_radius(1e-3);
             let least_mm = least_mm.unwrap();
-            let is_by_flanks = least_mm > 1.001 * least_of_round_mm(lobes, tooth_radius_mm);
+            let is_by_flanks = least_mm > 1.001 * least_radius_mm(lobes, tooth_radius_mm);
             are_hollow += i32::from(is_by_flanks);
-            // A lobe that is hardly too sharp cuts off next to nothing.
+            // A lobe that is barely too sharp loses almost nothing.
             let by = if is_by_flanks { 1e-3 } else { 2e-2 };
             for share in [1.0 - by, 1.0 + by] {
                 let (p, found) = of_radius(least_mm * share);
@@ -718,7 +718,7 @@ fn the_flanks_of_a_lobe_do_not_meet_however_large_the_stroke() {
                     (d * psi.cos(), d * psi.sin())
                 };
                 let centers: Vec<_> = (-20_000..20_000).map(|i| center(half_rad * f64::from(i) / 20_000.0)).collect();
-                // Finely in the valley, where large strokes are sharp.
+                // Fine steps in the valley, where large strokes have sharp curves.
                 let nearest_mm = (0..150)
                     .map(|i| {
                         let psi = half_rad * (1.0 - 0.93_f64.powi(i));
@@ -737,14 +737,14 @@ fn the_flanks_of_a_lobe_do_not_meet_however_large_the_stroke() {
     assert!(are_hollow > 3, "{are_hollow} whose flanks meet before anything else is wrong");
 }
 
-/// By the two conditions at lobe and valley, of an amplitude of 10 mm.
-fn least_of_round_mm(lobes: i64, r: f64) -> f64 {
+/// Returns the least radius from the conditions at lobe and valley, for an amplitude of 10 mm.
+fn least_radius_mm(lobes: i64, r: f64) -> f64 {
     let u = lobes as f64;
     (r + 10.0).max(0.5 * (r + (r * (r + 40.0 * u * u)).sqrt()) - 10.0)
 }
 
 #[test]
-fn a_cam_that_is_too_small_for_its_stroke_is_told_how_large_it_must_be() {
+fn too_small_cam_is_refused_with_least_size() {
     for (wave_generator, parameter) in [
         (eccentric(1.0, 1.2), Parameter::EccentricRadius),
         (harmonic(3, 8.0, 1.0), Parameter::MeanRadius),
@@ -782,7 +782,8 @@ fn a_cam_that_is_too_small_for_its_stroke_is_told_how_large_it_must_be() {
         }
         assert!(is_too_small(of_radius(least_mm)));
         assert!(!is_too_small(of_radius(least_mm * (1.0 + 1e-12))), "{least_mm} of {p:?}");
-        // Just above it the cam is sharp and convex at its sharpest, or its valley touches the axis; just below a cusp has turned inside out.
+        // Just above the limit the cam is convex at its sharpest point, or its valley touches the axis. Just below,
+        // a cusp is inverted.
         let sharpest = |radius_mm: f64| {
             let p = DriveParameters { wave_generator: of_radius(radius_mm), ..p };
             (0..=400)
@@ -804,7 +805,7 @@ fn a_cam_that_is_too_small_for_its_stroke_is_told_how_large_it_must_be() {
 }
 
 #[test]
-fn carrier_and_ring_differ_by_a_tooth_for_each_lobe() {
+fn tooth_counts_differ_by_one_per_lobe() {
     for lobes in 1..=7 {
         let beside = |ring_teeth| of(harmonic(lobes, 100.0, 0.3), 30, 30, ring_teeth, 2.0);
         for ring_teeth in 20_i64..40 {
@@ -814,7 +815,7 @@ fn carrier_and_ring_differ_by_a_tooth_for_each_lobe() {
         let Violation::ToothDifference { instead, .. } = violations(&beside(30))[0] else { panic!("{lobes}") };
         assert_eq!((instead.below, instead.above), (Some(30 - lobes), Some(30 + lobes)));
     }
-    // A ring of fewer teeth than there are lobes is no ring.
+    // A ring needs at least one tooth for each lobe.
     let Violation::ToothDifference { instead, .. } = violations(&of(harmonic(3, 100.0, 0.3), 5, 5, 2, 2.0))[0] else {
         panic!("a ring of two teeth")
     };
@@ -822,10 +823,10 @@ fn carrier_and_ring_differ_by_a_tooth_for_each_lobe() {
 }
 
 #[test]
-fn the_carrier_has_room_where_the_stroke_is_less_than_the_tooths_radius() {
+fn carrier_fits_if_stroke_is_below_tooth_radius() {
     for wave_generator in [eccentric(40.0, 1.0), harmonic(3, 40.0, 1.0), harmonic_path(3, 43.0, 1.0)] {
         let lobes = wave_generator.lobes();
-        // Few ring teeth, so that the tip is regular.
+        // Few ring teeth keep the tip regular.
         let of_radius = |tooth_radius_mm| of(wave_generator, 3 * lobes, 3 * lobes, 2 * lobes, tooth_radius_mm);
         assert!(Drive::new(&of_radius(1.001)).is_ok());
         let found = violations(&of_radius(0.999));
@@ -834,7 +835,7 @@ fn the_carrier_has_room_where_the_stroke_is_less_than_the_tooths_radius() {
 }
 
 #[test]
-fn neighbouring_teeth_of_every_kind_may_not_touch() {
+fn neighbouring_teeth_of_every_kind_must_not_touch() {
     for wave_generator in
         [eccentric(40.0, 1.2), harmonic(3, 40.0, 1.2), harmonic(5, 40.0, 0.5), harmonic_path(3, 43.0, 1.2)]
     {
@@ -847,7 +848,7 @@ fn neighbouring_teeth_of_every_kind_may_not_touch() {
             _ => None,
         });
         let limit_mm = limit_mm.unwrap_or_else(|| panic!("{touching:?}"));
-        // Least distance of two centres a spacing apart, by a fine scan without the solver.
+        // Least distance of two neighbouring centres, by a fine scan without the solver.
         let gap_mm = |r: f64| {
             let p = of_radius(r);
             let spacing = 2.0 * PI / teeth as f64;
@@ -863,13 +864,13 @@ fn neighbouring_teeth_of_every_kind_may_not_touch() {
 }
 
 #[test]
-fn a_hollow_wave_generator_turns_but_is_a_finding() {
+fn hollow_wave_generator_runs_but_is_a_finding() {
     let path = |amplitude_mm| of(harmonic_path(3, 52.0, amplitude_mm), 12, 12, 9, 6.0);
     let is_told = |p: &DriveParameters| {
         let found = findings::of_drive(&drive(p)).unwrap();
         found.iter().any(|finding| matches!(finding, Finding::HollowWaveGenerator { .. }))
     };
-    // Straight at R/(U² + 1), which is not hollow yet.
+    // At R/(U² + 1) the valley is straight, which is not hollow yet.
     assert!(is_told(&path(5.21)) && !is_told(&path(5.2)) && !is_told(&path(5.19)));
     let valley =
         |p: &DriveParameters| drive(p).flank().locus().at(Position::valley(3)).unwrap().cam_contact.curvature_per_mm;
@@ -879,21 +880,21 @@ fn a_hollow_wave_generator_turns_but_is_a_finding() {
 }
 
 #[test]
-fn one_tooth_a_zone_is_enough_where_the_zones_take_turns() {
-    // Four teeth on three lobes: a third of a lobe is a place.
+fn alternating_zones_need_only_one_tooth_each() {
+    // Four teeth on three lobes: each place is a third of a lobe.
     let p = of(harmonic(3, 48.0, 1.0), 28, 4, 25, 4.0);
     let mesh = Mesh::new(&drive(&p));
     assert!(!mesh.zones_are_alike() && mesh.always_carries());
     assert_eq!(mesh.teeth_in_mesh(), TeethInMesh { min: 2, max: 2 });
     let sweep: Sweep = swept(&p, &load(5.0, VirtualWork), 30);
     assert!(sweep.torque_balance_residual < 1e-13 && sweep.period_closure_residual < 1e-13);
-    // Three of them stand alike on three lobes, each a zone's only one, which has no lever arm at times.
+    // Three teeth on three lobes are alike. Each is alone in its zone and has no lever arm at some angles.
     let p = of(harmonic(3, 48.0, 1.0), 30, 3, 27, 4.0);
     assert!(!Mesh::new(&drive(&p)).always_carries());
 }
 
 #[test]
-fn clearances_and_power_laws_work_on_teeth_of_all_zones() {
+fn clearances_and_power_laws_balance_all_zones() {
     for p in family() {
         let mut load = load(7.0, VirtualWork);
         load.law = ContactLaw::Palmgren;
@@ -906,7 +907,7 @@ fn clearances_and_power_laws_work_on_teeth_of_all_zones() {
 }
 
 #[test]
-fn grooves_are_wider_than_balls_and_flats_shorter_than_the_tooth_is_thick() {
+fn grooves_exceed_balls_and_flats_are_short() {
     let ball = |radius| ToothShape::Ball {
         groove_radius_mm: PerContact { wave_generator: Some(radius), ring: None, carrier: Some(5.2) },
     };
@@ -922,12 +923,12 @@ fn grooves_are_wider_than_balls_and_flats_shorter_than_the_tooth_is_thick() {
 }
 
 #[test]
-fn flats_may_not_end_the_arc_before_the_steepest_contact_with_the_ring() {
+fn flat_cutting_steepest_contact_is_a_finding() {
     let with = |flat_length_mm| DriveParameters {
         tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm },
         ..PAPER_5_1
     };
-    // The contact that lies farthest from the slot's middle line, by the flank's points in the tooth's own frame.
+    // The contact farthest from the slot's middle line, by the flank's points in the tooth's frame.
     let drive_of = drive(&PAPER_5_1);
     let flank = drive_of.flank();
     let farthest_mm = (1..1000)
@@ -946,7 +947,7 @@ fn flats_may_not_end_the_arc_before_the_steepest_contact_with_the_ring() {
 }
 
 #[test]
-fn in_an_assembly_every_tooth_stands_in_its_slot_on_the_path() {
+fn assembly_places_every_tooth_on_path_in_slot() {
     for p in family() {
         let (n, input_angle_deg) = (p.installed as f64, 7.0_f64);
         let parameters = DrawingParameters { chord_tolerance_mm: 1e-2, max_points: 1_000_000, input_angle_deg };
@@ -967,7 +968,7 @@ fn in_an_assembly_every_tooth_stands_in_its_slot_on_the_path() {
 }
 
 #[test]
-fn a_bored_flank_of_every_kind_ends_where_it_meets_the_bore() {
+fn bored_flank_of_every_kind_ends_at_bore() {
     for unbored in family() {
         let unbored = DriveParameters { tip_radius_mm: None, ..unbored };
         let natural = drive(&unbored);
@@ -979,7 +980,7 @@ fn a_bored_flank_of_every_kind_ends_where_it_meets_the_bore() {
             let end = bored.flank_limit();
             assert_eq!(end.end, FlankEnd::Bore);
             let tooth = bored.flank().locus().at(end.position).unwrap();
-            // The flank is the tooth's radius off the path, along its normal.
+            // The flank is one radius from the path along its normal.
             let ring_teeth_per_lobe = unbored.ring_teeth as f64 / f64::from(bored.lobes());
             let (r, tan) = (unbored.tooth_radius_mm, tooth.tan_pressure_angle * ring_teeth_per_lobe);
             let along_mm = tooth.center_radius_mm + r / tan.hypot(1.0);

@@ -1,4 +1,4 @@
-//! The fast path against the plain one, in everything that a sweep returns, on any drive.
+//! The fast path against the plain path, in all results of a sweep, on any drive.
 
 use alloc_counter::count_alloc;
 use proptest::prelude::*;
@@ -15,14 +15,14 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, ellipse, everywhere, load, swept};
 
-/// How far two ways to the same number may be apart, over what its terms came to.
+/// Allowed difference of two calculations, relative to the sum of the terms.
 const ROUNDING: f64 = 1e-12;
 
 fn largest(column: &[f64]) -> f64 {
     column.iter().fold(0.0_f64, |most, value| most.max(value.abs()))
 }
 
-/// Drives far more elliptic than [`any_swept_drive`] has them, as far as the fast path goes: a/b to 5.
+/// Generates drives more elliptic than those of [`any_swept_drive`], up to the fast path's limit a/b = 5.
 fn any_elliptic_drive() -> impl Strategy<Value = DriveParameters> {
     let shape = (1.2_f64..5.0, 0.0_f64..1.0, 0.0_f64..1.0);
     (shape, 4_i64..40, prop::sample::select(vec![1_i64, 2]), 0.05_f64..0.95, any::<bool>()).prop_filter_map(
@@ -49,7 +49,7 @@ fn any_elliptic_drive() -> impl Strategy<Value = DriveParameters> {
     )
 }
 
-/// Wave generators that are no ellipse, of all strokes from next to nothing to hollow valleys.
+/// Generates wave generators other than ellipses, with strokes from tiny to hollow valleys.
 pub(crate) fn any_drive_of_other_kinds() -> impl Strategy<Value = DriveParameters> {
     let counts = (1_u32..8, 2_i64..20, prop::sample::select(vec![1_i64, 2]), any::<bool>());
     let shape = (any::<bool>(), -4.0_f64..0.0, 0.05_f64..0.95, prop::option::of(0.0_f64..1.0));
@@ -74,7 +74,8 @@ pub(crate) fn any_drive_of_other_kinds() -> impl Strategy<Value = DriveParameter
     )
 }
 
-/// A drive with centres around 50 mm that exists and has a lever arm at every input angle; `bore` is how much of its stroke it takes from the ring's teeth.
+/// Returns a possible drive with centres near 50 mm and a lever arm at every angle.
+/// `bore` is the share of the stroke that is bored away from the ring's teeth.
 fn carrying(
     wave_generator: WaveGenerator,
     [teeth, installed, ring_teeth]: [i64; 3],
@@ -95,7 +96,7 @@ fn carrying(
     Mesh::new(&possible).always_carries().then_some(parameters)
 }
 
-/// Wave generators of all kinds with as many slots as make their zones unlike.
+/// Generates all kinds of wave generators with slot counts that make their zones unlike.
 pub(crate) fn any_drive_of_unlike_zones() -> impl Strategy<Value = DriveParameters> {
     let counts = (2_i64..8, 5_i64..60, prop::sample::select(vec![1_i64, 2]), any::<bool>());
     let shape = (0_u32..3, -4.0_f64..0.0, 0.05_f64..0.9, prop::option::of(0.0_f64..1.0));
@@ -121,7 +122,7 @@ pub(crate) fn any_drive_of_unlike_zones() -> impl Strategy<Value = DriveParamete
     )
 }
 
-/// Columns by name.
+/// Returns the columns with their names.
 fn columns(sweep: &Sweep) -> Vec<(&'static str, &Vec<f64>)> {
     let (states, angles) = (&sweep.states, &sweep.input_angles);
     vec![
@@ -142,7 +143,7 @@ fn columns(sweep: &Sweep) -> Vec<(&'static str, &Vec<f64>)> {
     ]
 }
 
-/// How much a relative error of the flank's terms becomes in the stress at the ring: `1 + rκ` may be a small difference.
+/// Returns the amplification of a flank's relative error in the ring's stress. `1 + rκ` may be a small difference.
 fn amplification(drive: &Drive, position_deg: f64) -> f64 {
     let lobes = drive.lobes();
     let valley_deg = 180.0 / f64::from(lobes);
@@ -160,7 +161,7 @@ fn amplification(drive: &Drive, position_deg: f64) -> f64 {
     1.0 + (1.0 + r_over_d * (1.0 + bending)) / point.regularity
 }
 
-/// How much a relative error of a closing angle becomes in what is turned beyond it: `1 + Δφ K/M0`, K the stiffness, where there are gaps.
+/// Returns the amplification of a closing angle's error: `1 + Δφ K/M0` with the stiffness K if there are gaps, else 1.
 fn amplification_by_gaps(drive: &Drive, load: &LoadCase, deviations: &Deviations, plain: &Sweep) -> f64 {
     if !load.has_gaps() && deviations.is_nil() {
         return 1.0;
@@ -172,8 +173,8 @@ fn amplification_by_gaps(drive: &Drive, load: &LoadCase, deviations: &Deviations
     1.0 + rotations.zip(stiffnesses).map(|(rad, stiffness)| rad * stiffness / output_nm).fold(0.0, f64::max)
 }
 
-/// The same under a capacity's own torque, which may be many orders below the load's; 1 where there is no answer under it. Below the least torque that a
-/// load may have it grows at most as the torque falls: no law presses in less than in proportion.
+/// Returns the same at the capacity's own torque, which may be far below the load's, or 1 without an answer there.
+/// Below the least allowed torque it grows at most as the torque falls: no approach falls faster than its force.
 fn amplification_by_gaps_under(
     drive: &Drive,
     load: &LoadParameters,
@@ -193,8 +194,8 @@ fn amplification_by_gaps_under(
     1.0 + (amplified - 1.0) * input_torque_nm / capacity_nm
 }
 
-/// How much more of it the stiffness shows at each input angle, where a law has a slope of its own: that of a tooth that has just begun to carry, the logarithm of
-/// which moves with that of its force by a seventh at most, while what presses it is a small difference.
+/// Returns the further amplification in the stiffness at each input angle, for laws with a varying slope. A barely
+/// loaded tooth has an approach that is a small difference, and its slope changes by at most a seventh of its force.
 fn amplification_of_stiffness(plain: &Sweep) -> Vec<f64> {
     let states = &plain.states;
     let angles = plain.input_angles.input_angle_deg.iter();
@@ -213,7 +214,7 @@ fn assert_both_paths_agree(parameters: &DriveParameters, load: &LoadParameters, 
     assert_both_paths_agree_on(parameters, load, &Deviations::default(), samples);
 }
 
-/// The same of parts that deviate.
+/// Compares both paths with deviations.
 fn assert_both_paths_agree_on(
     parameters: &DriveParameters,
     load: &LoadParameters,
@@ -233,7 +234,7 @@ fn assert_both_paths_agree_on(
         )
     };
     let (Ok(fast), Ok(plain)) = &answers else {
-        // What has no answer has none by either way, for the same reason.
+        // Both paths must give the same error.
         assert_eq!(format!("{:?}", answers.0.map(|_| ())), format!("{:?}", answers.1.map(|_| ())));
         return;
     };
@@ -247,11 +248,11 @@ fn assert_both_paths_agree_on(
     let of_plain = &plain.states.force_n;
     for ((name, fast), (_, plain)) in columns(fast).into_iter().zip(columns(plain)) {
         assert_eq!(fast.len(), plain.len(), "{name}");
-        // The angle on the ring is the difference of two, of which the first is at most a quarter turn over k.
+        // The angle on the ring is a difference. Its first term is at most a quarter turn over k.
         let valley_deg = 180.0 / f64::from(drive.lobes());
         let of_terms = if name == "angle on the ring" { valley_deg / drive.flank().teeth_per_wave() } else { 0.0 };
         let scale = largest(plain).max(of_terms);
-        // A stress is a root of its force, and relatively no further off: of a tooth that has just begun to carry both are small differences.
+        // A stress follows its force with the same relative error. For a barely loaded tooth both are small.
         let forces = match name {
             _ if by_gaps == 1.0 => None,
             "stress at the cam" => Some(&of_plain.wave_generator),
@@ -275,7 +276,7 @@ fn assert_both_paths_agree_on(
     }
     for (contact, peaks) in fast.peaks.iter() {
         let expected = plain.peaks.get(contact);
-        // Where two states are as high, rounding decides which is the peak; its value is the column's in either case.
+        // If two states are equally high, rounding decides which is the peak. Its value is the column's either way.
         let amplified = amplification(&drive, expected.stress_mpa.position_deg);
         let amplified = by_gaps * if contact == Contact::Ring { amplified } else { 1.0 };
         let pairs = [(peaks.force_n, expected.force_n, by_gaps), (peaks.stress_mpa, expected.stress_mpa, amplified)];
@@ -304,7 +305,7 @@ fn assert_both_paths_agree_on(
             assert_eq!(peaks.shear.is_some(), expected.shear.is_some());
             if let Some((found, expected)) = peaks.shear.zip(expected.shear) {
                 assert_near("shear", found.stress_mpa, expected.stress_mpa);
-                // The depth of a largest value is known to half the digits.
+                // The depth of the maximum has half of the digits.
                 let off = (found.depth_mm / expected.depth_mm - 1.0).abs();
                 assert!(off <= 1e-7 * amplified.max(1.0), "{contact:?}: depth of shear of {parameters:?}");
             }
@@ -343,7 +344,7 @@ fn assert_both_paths_agree_on(
     }
 }
 
-/// That peaks alone are those of a sweep in which the teeth of all zones are listed, up to rounding; where they stand, another lap may tell as well.
+/// Asserts that peaks alone equal those of a sweep over all zones, up to rounding. Their places may be in another lap.
 fn assert_same_peaks(
     drive: &Drive,
     peaks: &SweepPeaks,
@@ -379,7 +380,7 @@ fn assert_same_peaks(
 }
 
 fn any_stiffnesses() -> impl Strategy<Value = [f64; 3]> {
-    // Near enough to each other for `projection` to have a solution on every drive.
+    // Similar stiffnesses, so that `projection` has a solution on every drive.
     prop_oneof![Just([1e6; 3]), prop::array::uniform3(0.9e6_f64..1.1e6)]
 }
 
@@ -390,9 +391,9 @@ fn any_samples() -> impl Strategy<Value = u64> {
 proptest! {
     #![proptest_config(cases(256))]
 
-    /// Over each other unlike zones are one: they were worked out tooth by tooth, thirty times as slowly.
+    /// Superposed, unlike zones form one zone. This is thirty times faster than tooth by tooth.
     #[test]
-    fn peaks_of_unlike_zones_are_those_of_all_their_teeth(
+    fn unlike_zones_match_plain_peaks(
         parameters in any_drive_of_unlike_zones(),
         law in prop::sample::select(vec![ContactLaw::Linear, ContactLaw::Palmgren, JOHNSON]),
         torque_exponent in -1.0_f64..2.0,
@@ -413,7 +414,7 @@ proptest! {
     #![proptest_config(cases(256))]
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one(
+    fn fast_path_matches_plain_path(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds()],
         by_virtual_work in any::<bool>(),
         [wave_generator, ring, carrier] in any_stiffnesses(),
@@ -436,7 +437,7 @@ proptest! {
     }
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one_under_every_law_with_and_without_gaps(
+    fn fast_path_matches_plain_under_every_law(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds()],
         by_virtual_work in any::<bool>(),
         law in any_law(),
@@ -451,7 +452,7 @@ proptest! {
         let is_projection = !by_virtual_work && matches!(law, ContactLaw::Linear | ContactLaw::Palmgren);
         let mut series_compliance_mm_per_n = PerContact::default();
         if is_projection {
-            // The only gap that `projection` weighs alike on every drive.
+            // Only the wave generator's gap has the same `projection` weight on every drive.
             (clearance_um.ring, clearance_um.carrier) = (0.0, 0.0);
         } else {
             let [wave_generator, ring, carrier] = series;
@@ -467,7 +468,7 @@ proptest! {
     }
 }
 
-/// Of balls in grooves of any closeness or none, and of flats of any length that the drive's teeth can have; the shape by itself where they can have none.
+/// Generates balls with any grooves or none, and flats of any possible length. Drives without room keep their teeth.
 pub(crate) fn any_other_teeth() -> impl Strategy<Value = OtherTeeth> {
     let wider = || prop::option::of((-3.0_f64..1.0).prop_map(|exponent| 1.0 + 10.0_f64.powf(exponent)));
     prop_oneof![
@@ -482,9 +483,9 @@ pub(crate) fn any_other_teeth() -> impl Strategy<Value = OtherTeeth> {
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum OtherTeeth {
-    /// Of grooves the radius over the ball's.
+    /// Groove radii over the ball's radius.
     Balls(PerContact<Option<f64>>),
-    /// Length of the flat over the longest that the ring's contacts leave.
+    /// Length of the flat over the greatest length possible at the ring's contacts.
     Flats(f64),
 }
 
@@ -509,7 +510,7 @@ proptest! {
     #![proptest_config(cases(256))]
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one_for_balls_and_flat_sided_teeth(
+    fn fast_path_matches_plain_for_balls_and_flats(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds()],
         teeth in any_other_teeth(),
         law in any_law(),
@@ -531,9 +532,9 @@ proptest! {
     }
 }
 
-/// Under 10 MPa at the slots the balls press in a hundred-thousandth of the gap that they close first: the last bits of the gap are 2e-11 of the torque.
+/// At 10 MPa the balls' approach is 1e-5 of the gap, so rounding of the gap is 2e-11 of the torque.
 #[test]
-fn a_capacity_far_below_the_load_is_known_to_what_gaps_leave_of_its_own_digits() {
+fn tiny_capacity_is_accurate_despite_wide_gaps() {
     let parameters = DriveParameters {
         wave_generator: ellipse(39.33379486205007, 39.27141175813306),
         teeth: 300,
@@ -557,7 +558,7 @@ fn a_capacity_far_below_the_load_is_known_to_what_gaps_leave_of_its_own_digits()
 }
 
 #[test]
-fn balls_take_the_fast_path_on_undercut_flanks_too_and_on_any_wave_generator() {
+fn undercut_balls_take_fast_path_on_any_generator() {
     let ball = ToothShape::Ball { groove_radius_mm: PerContact::default() };
     let on = |wave_generator: WaveGenerator| DriveParameters {
         wave_generator,
@@ -568,7 +569,7 @@ fn balls_take_the_fast_path_on_undercut_flanks_too_and_on_any_wave_generator() {
     let case = LoadCase::new(&load).unwrap();
     for parameters in [
         PAPER_5_2,
-        // A thousandth beyond the threshold of undercut.
+        // A thousandth above the undercut threshold.
         DriveParameters { tooth_radius_mm: 6.756, ..PAPER_5_1 },
         on(WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 }),
         on(WaveGenerator::Harmonic { lobes: 7, mean_radius_mm: 57.0, amplitude_mm: 0.3 }),
@@ -582,7 +583,7 @@ fn balls_take_the_fast_path_on_undercut_flanks_too_and_on_any_wave_generator() {
 }
 
 #[test]
-fn palmgrens_law_takes_the_fast_path_before_what_gives_way_behind_it_too() {
+fn palmgren_with_series_compliance_takes_fast_path() {
     let parts = PerContact { wave_generator: 1e-6, ring: 0.0, carrier: 3e-6 };
     for series_compliance_mm_per_n in [parts, everywhere(1e-9), everywhere(1e-3)] {
         for (gap_um, torque_nm) in [(0.0, 20.0), (3.0, 20.0), (3.0, 1e-3)] {
@@ -605,7 +606,7 @@ fn palmgrens_law_takes_the_fast_path_before_what_gives_way_behind_it_too() {
 }
 
 #[test]
-fn balls_and_flat_sided_teeth_take_the_fast_path() {
+fn balls_and_flat_sided_teeth_take_fast_path() {
     let groove_radius_mm = PerContact { wave_generator: Some(5.3), ring: Some(5.2), carrier: None };
     let ball = ToothShape::Ball { groove_radius_mm };
     let flat = |flat_length_mm| ToothShape::FlatSided { width_mm: 15.0, flat_length_mm };
@@ -639,9 +640,9 @@ fn balls_and_flat_sided_teeth_take_the_fast_path() {
     }
 }
 
-/// Their columns know Hertz's law alone.
+/// The fast columns of balls know only Hertz's law without a series compliance.
 #[test]
-fn balls_of_other_laws_or_with_what_gives_way_behind_them_are_computed_as_in_the_plain_path() {
+fn balls_beyond_plain_hertz_match_plain_path() {
     let ball = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm: PerContact::default() }, ..PAPER_5_1 };
     for (law, series_compliance_mm_per_n) in [
         (ContactLaw::Hertz, everywhere(3e-6)),
@@ -664,7 +665,7 @@ fn any_law() -> impl Strategy<Value = ContactLaw> {
     ]
 }
 
-/// Parts made otherwise than conjugate, of the size of the first; too full where what covers them is not enough.
+/// Generates modifications of one common size. Some are not covered by gaps and give an interference.
 fn any_modification() -> impl Strategy<Value = Modification> {
     let part = || prop_oneof![Just(0.0), -1.0_f64..1.0];
     let relief = (0.0_f64..1.0, prop_oneof![Just(1.0), Just(2.0), 0.1_f64..5.0]);
@@ -699,8 +700,8 @@ fn any_modification() -> impl Strategy<Value = Modification> {
     )
 }
 
-/// With a tip relief that begins where the drive has a flank: so many turns, of which a flank has a part.
-fn begun_on_flank(modification: Modification, parameters: &DriveParameters) -> Modification {
+/// Moves the start of a tip relief onto the drive's flank.
+fn start_on_flank(modification: Modification, parameters: &DriveParameters) -> Modification {
     let end_deg = drive(parameters).flank_limit().position.from_lobe_deg();
     let ring_tip_relief = modification
         .ring_tip_relief
@@ -708,7 +709,7 @@ fn begun_on_flank(modification: Modification, parameters: &DriveParameters) -> M
     Modification { ring_tip_relief, ..modification }
 }
 
-/// Numbers for the items of a drive, which seem to be at random, of the kinds that are wanted.
+/// Pseudo-random deviations of the chosen kinds.
 #[derive(Debug, Clone, Copy)]
 struct Deviating {
     size: f64,
@@ -762,14 +763,14 @@ impl Deviating {
     }
 }
 
-/// States of a sweep that both ways are asked for at most.
+/// Largest number of states in a comparison of both paths.
 const MOST_STATES: u64 = 30_000;
 
 proptest! {
     #![proptest_config(cases(256))]
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one_on_parts_made_otherwise_than_conjugate(
+    fn fast_path_matches_plain_with_modifications(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds(), any_drive_of_unlike_zones()],
         teeth in prop::option::of(any_other_teeth()),
         law in any_law(),
@@ -784,7 +785,7 @@ proptest! {
         let [wave_generator, ring, carrier] = clearance;
         let load = LoadParameters {
             law: if is_ball { ContactLaw::Hertz } else { law },
-            modification: begun_on_flank(modification, &parameters),
+            modification: start_on_flank(modification, &parameters),
             clearance_um: PerContact { wave_generator, ring, carrier },
             allowable_stress_mpa: allowable_stress_mpa.map(everywhere),
             ..load(10.0_f64.powf(torque_exponent), Compatibility::VirtualWork)
@@ -793,7 +794,7 @@ proptest! {
     }
 
     #[test]
-    fn the_fast_path_agrees_with_the_plain_one_where_single_items_deviate(
+    fn fast_path_matches_plain_with_deviations(
         parameters in prop_oneof![any_swept_drive(), any_elliptic_drive(), any_drive_of_other_kinds(), any_drive_of_unlike_zones()],
         teeth in prop::option::of(any_other_teeth()),
         law in any_law(),
@@ -811,7 +812,7 @@ proptest! {
         let is_ball = matches!(parameters.tooth, ToothShape::Ball { .. });
         let load = LoadParameters {
             law: if is_ball { ContactLaw::Hertz } else { law },
-            modification: modification.map_or(Modification::NONE, |modification| begun_on_flank(modification, &parameters)),
+            modification: modification.map_or(Modification::NONE, |modification| start_on_flank(modification, &parameters)),
             clearance_um: everywhere(clearance_um),
             allowable_stress_mpa: allowable_stress_mpa.map(everywhere),
             ..load(10.0_f64.powf(torque_exponent), Compatibility::VirtualWork)
@@ -820,13 +821,13 @@ proptest! {
     }
 }
 
-/// Johnson's law with its own depths.
+/// Johnson's law with its default depths.
 const JOHNSON: ContactLaw =
     ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
 
-/// One whose force is 3e-13 of the largest has six digits of it, and its stress as many.
+/// A force of 3e-13 of the largest has six correct digits, and so has its stress.
 #[test]
-fn the_stress_of_a_tooth_that_has_just_begun_to_carry_is_known_as_well_as_its_force() {
+fn stress_of_barely_loaded_tooth_is_accurate() {
     let wave_generator =
         WaveGenerator::HarmonicPath { lobes: 6, mean_path_radius_mm: 50.0, amplitude_mm: 0.001187144819369505 };
     let tooth_radius_mm = 2.694129592460173;
@@ -862,7 +863,7 @@ fn the_stress_of_a_tooth_that_has_just_begun_to_carry_is_known_as_well_as_its_fo
 }
 
 #[test]
-fn the_fast_path_is_taken_under_every_law_with_and_without_gaps() {
+fn fast_path_is_taken_under_every_law() {
     for law in [ContactLaw::Linear, ContactLaw::Palmgren, JOHNSON] {
         for gap_um in [0.0, 1.0] {
             let clearance_um = PerContact { wave_generator: gap_um, ring: gap_um, carrier: gap_um };
@@ -877,13 +878,13 @@ fn the_fast_path_is_taken_under_every_law_with_and_without_gaps() {
                 let load = LoadCase::new(&load).unwrap();
                 sweep_plain(&drive(&PAPER_5_1), &load, Points::samples(50).unwrap(), &Never).unwrap()
             });
-            // The same numbers but for their last digits, which no two ways share throughout.
+            // Equal except in the last digits, which differ between the paths.
             assert_ne!(fast.states.stress_mpa, plain.states.stress_mpa, "{law:?} {gap_um}");
         }
     }
 }
 
-/// Drives of one lobe to four, zones alike and not.
+/// Returns drives of one to four lobes, with alike and unlike zones.
 fn drives_that_may_deviate() -> Vec<DriveParameters> {
     let of = |wave_generator: WaveGenerator, teeth, ring_teeth| DriveParameters {
         wave_generator,
@@ -902,7 +903,7 @@ fn drives_that_may_deviate() -> Vec<DriveParameters> {
 }
 
 #[test]
-fn the_fast_path_is_taken_where_single_items_deviate_wherever_the_laps_of_a_sweep_begin() {
+fn deviations_take_fast_path_from_any_lap_start() {
     let kinds = [
         ([true, true, true, false, false, false], [false, false, true]),
         ([false, false, false, true, true, false], [false, true, false]),
@@ -928,8 +929,8 @@ fn the_fast_path_is_taken_where_single_items_deviate_wherever_the_laps_of_a_swee
 }
 
 #[test]
-fn where_single_items_deviate_and_where_zones_are_unlike_a_tolerance_is_kept_by_either_way_of_looking() {
-    // Where they look differs in the last digits, but for the first sixteen intervals.
+fn both_paths_keep_tolerance_with_unlike_items() {
+    // The paths examine different places in the last digits, after the first sixteen intervals.
     let mut looked_elsewhere = [0, 0];
     for (parameters, seed) in drives_that_may_deviate().into_iter().zip(1..) {
         let drive = drive(&parameters);
@@ -968,7 +969,7 @@ fn where_single_items_deviate_and_where_zones_are_unlike_a_tolerance_is_kept_by_
 }
 
 #[test]
-fn the_fast_path_is_taken_by_parts_made_otherwise_than_conjugate_and_by_unlike_zones() {
+fn modifications_and_unlike_zones_take_fast_path() {
     let relief = TipRelief { amount_um: 5.0, start_deg: 20.0, power: 2.0 };
     for (parameters, law) in drives_that_may_deviate()
         .into_iter()
@@ -980,7 +981,7 @@ fn the_fast_path_is_taken_by_parts_made_otherwise_than_conjugate_and_by_unlike_z
             Modification { ring_tip_relief: Some(relief), ..Modification::NONE },
             Modification { ring_equidistant_um: 4.0, ring_path_shift_um: -3.0, ..Modification::NONE },
             Modification { ring_profile_shift_um: 3.0, tooth_radius_um: 1.0, slot_wall_um: 2.0, ..Modification::NONE },
-            // Lost motion alone makes up for what the ring has too much of.
+            // The lost motion covers the ring's interference.
             Modification { ring_rotation_arcsec: 200.0, ring_equidistant_um: -1.0, ..Modification::NONE },
             Modification { carrier_rotation_arcsec: 9.0, wave_generator_equidistant_um: 1.0, ..Modification::NONE },
         ] {
@@ -1003,7 +1004,7 @@ fn the_fast_path_is_taken_by_parts_made_otherwise_than_conjugate_and_by_unlike_z
 }
 
 #[test]
-fn the_fast_path_is_taken_by_every_wave_generator() {
+fn every_wave_generator_takes_fast_path() {
     for wave_generator in [
         WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 },
         WaveGenerator::Harmonic { lobes: 1, mean_radius_mm: 57.0, amplitude_mm: 1.0 },
@@ -1016,7 +1017,7 @@ fn the_fast_path_is_taken_by_every_wave_generator() {
         let parameters = DriveParameters { wave_generator, ring_teeth: 28 - lobes, ..PAPER_5_1 };
         let load = LoadParameters { law: JOHNSON, ..load(20.0, Compatibility::VirtualWork) };
         let case = LoadCase::new(&load).unwrap();
-        // Some tiles turn far, and have lanes that hold no tooth.
+        // Some tiles cover large rotations and have empty lanes.
         for samples in [50, 5000] {
             assert_both_paths_agree(&parameters, &load, samples);
             let plain = sweep_plain(&drive(&parameters), &case, Points::samples(samples).unwrap(), &Never).unwrap();
@@ -1027,18 +1028,18 @@ fn the_fast_path_is_taken_by_every_wave_generator() {
 }
 
 #[test]
-fn a_drive_whose_contacts_are_wider_than_johnsons_law_allows_is_refused_by_either_path() {
+fn both_paths_refuse_contacts_beyond_johnsons_law() {
     for torque_nm in [1e4, 1e5, 1e6, 1e7] {
         let load = LoadParameters { law: JOHNSON, ..load(torque_nm, Compatibility::VirtualWork) };
         assert_both_paths_agree(&PAPER_5_1, &load, 10);
     }
-    // A capacity may be wanted that lies beyond.
+    // The capacity may lie beyond the law's end.
     for exponent in 0..38 {
         let allowable_stress_mpa = Some(everywhere(1e3 * 1.2_f64.powi(exponent)));
         let load = LoadParameters { law: JOHNSON, allowable_stress_mpa, ..load(20.0, Compatibility::VirtualWork) };
         assert_both_paths_agree(&PAPER_5_1, &load, 10);
     }
-    // The load at which the law ends at some input angle, from below and from above.
+    // The load at which the law ends at some input angle, from both sides.
     let ends = |torque_nm: f64| {
         let load =
             LoadCase::new(&LoadParameters { law: JOHNSON, ..load(torque_nm, Compatibility::VirtualWork) }).unwrap();
@@ -1057,7 +1058,7 @@ fn a_drive_whose_contacts_are_wider_than_johnsons_law_allows_is_refused_by_eithe
 }
 
 #[test]
-fn a_torque_that_is_off_at_any_of_the_three_parts_is_seen() {
+fn residual_detects_torque_error_at_each_part() {
     let balance = TorqueBalance::new(&drive(&PAPER_5_1), 20_000.0);
     let right = PerContact { wave_generator: 20_000.0, ring: 260_000.0, carrier: 280_000.0 };
     assert!(balance.residual(&right) < 1e-15);
@@ -1079,9 +1080,9 @@ fn a_torque_that_is_off_at_any_of_the_three_parts_is_seen() {
     }
 }
 
-/// What no fast path reaches: pointed and bored tips by default. Studies ask it of as many intervals as a sweep may have.
+/// Default models of pointed and bored tips have no fast path. Studies ask for as many intervals as a sweep may have.
 #[test]
-fn peaks_that_are_worked_out_tooth_by_tooth_keep_no_states_either() {
+fn peaks_computed_tooth_by_tooth_keep_no_states() {
     let gap = PerContact { ring: 2.0, ..PerContact::default() };
     let unlike = DriveParameters { teeth: 81, installed: 27, ring_teeth: 79, tooth_radius_mm: 2.2, ..PAPER_5_2 };
     let johnson = LoadParameters { law: JOHNSON, ..load(3.0, Compatibility::VirtualWork) };
@@ -1094,18 +1095,18 @@ fn peaks_that_are_worked_out_tooth_by_tooth_keep_no_states_either() {
         let load = LoadParameters { allowable_stress_mpa: Some(everywhere(900.0)), ..load };
         let (drive, case) = (drive(&parameters), LoadCase::new(&load).unwrap());
         let of = |samples| count_alloc(|| peaks(&drive, &case, Points::samples(samples).unwrap(), &Never).unwrap());
-        // The boundary elements of the ring are solved by the first.
+        // The first sweep solves the ring's boundary elements.
         of(10);
         let ((_, growths, _), few) = of(1000);
         assert_eq!(few, SweepPeaks::from(&swept(&parameters, &load, 1000)), "{parameters:?} {load:?}");
-        // An input angle may have its own: columns would grow by the logarithm of their length besides.
+        // Each input angle may have a fixed number of allocations. Growing columns would add a logarithm.
         let ((_, more_growths, _), _) = of(5000);
         assert_eq!((more_growths - growths) % 4000, 0, "{parameters:?} {load:?}");
     }
 }
 
 #[test]
-fn a_sweep_allocates_columns_and_nothing_a_state() {
+fn sweep_allocates_only_columns() {
     let allocations = |samples| {
         let load = load(20.0, Compatibility::Projection);
         let ((allocations, growths, _), sweep) = count_alloc(|| swept(&PAPER_5_1, &load, samples));
@@ -1114,6 +1115,6 @@ fn a_sweep_allocates_columns_and_nothing_a_state() {
     let (few_states, of_few) = allocations(50);
     let (many_states, of_many) = allocations(5000);
     assert!(many_states > 90 * few_states, "{few_states}, {many_states}");
-    // Columns that grow are moved a number of times that rises with the logarithm of their length.
+    // Growing columns are moved as often as the logarithm of their length.
     assert!(of_few <= of_many && of_many < of_few + 30, "{of_few}, {of_many}");
 }

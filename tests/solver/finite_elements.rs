@@ -1,6 +1,7 @@
-//! The default model, virtual work with Johnson's law, against elastic bodies in contact (`tests/finite_elements`, docs/validation.md).
+//! The default model, virtual work with Johnson's law, against elastic bodies in contact
+//! (`tests/finite_elements`, docs/explanation/validation.md).
 //!
-//! Each case is one input angle of a drive, its parts held 5 mm behind the contacts, which is the depth that Johnson's law is given.
+//! Each case is one input angle of a drive. Its parts are held 5 mm behind the contacts, the depth in Johnson's law.
 
 use std::f64::consts::PI;
 
@@ -15,7 +16,7 @@ use toothwave_solver::{
 
 use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, ellipse, load, swept};
 
-/// Each input angle of the cases is one of so many equal intervals of its drive's period.
+/// Intervals in a period. Each case has the input angle of one of them.
 const INTERVALS: u64 = 240;
 
 #[derive(Deserialize)]
@@ -31,7 +32,7 @@ struct SingleContact {
     force_n_per_mm: f64,
     depth_mm: f64,
     pressure_mpa: f64,
-    /// Of the blocks on both sides to each other.
+    /// Approach of the blocks on both sides.
     approach_mm: f64,
 }
 
@@ -55,25 +56,25 @@ struct Case {
 #[derive(Deserialize)]
 struct Tooth {
     position_deg: f64,
-    /// At wave generator, ring and carrier.
+    /// Forces at wave generator, ring and carrier.
     force_n: [f64; 3],
     pressure_mpa: [f64; 3],
 }
 
-/// How far the model is off, as shares.
+/// Errors of the model as shares.
 struct Errors {
-    /// Of the largest force at the wave generator.
+    /// Error of the largest force at the wave generator.
     peak: f64,
-    /// Of the largest force of each contact.
+    /// Error of the largest force at each contact.
     force: [f64; 3],
-    /// Of the worst tooth's force there, over the largest.
+    /// Largest error of a tooth's force at the wave generator, over the largest force.
     worst_tooth: f64,
-    /// Of the pressure where each contact has its largest force: the narrower a contact, the fewer elements share it.
+    /// Error of the pressure at each contact's largest force. Narrow contacts have few elements.
     stress: [f64; 3],
     wind_up: f64,
 }
 
-/// What is allowed of each of the default model's.
+/// Allowed errors of the default model.
 struct Allowed {
     peak: f64,
     worst_tooth: f64,
@@ -91,7 +92,7 @@ impl Case {
         format!("{drive} at {input_angle_deg} deg, {ring_gap_um} µm at the ring, {slot_gap_um} µm at the slot")
     }
 
-    /// The ring of case 5.2 has pointed teeth, which bend; the model knows nothing of that, and its tooth nearest to the tip carries too much.
+    /// Returns the allowed errors. The model ignores that the pointed ring teeth of case 5.2 bend.
     fn allowed(&self) -> Allowed {
         match self.drive.as_str() {
             "5.2" => Allowed { peak: 0.05, worst_tooth: 0.08, stress: [0.055; 3], wind_up: 0.06 },
@@ -112,7 +113,7 @@ impl Case {
         }
     }
 
-    /// Johnson's law for bodies that are held where those of the case are.
+    /// Returns Johnson's law with depths up to where the case's bodies are held.
     fn johnson(&self) -> ContactLaw {
         ContactLaw::Johnson { depth_mm: PerContact::of(|_| Some(self.depth_mm)) }
     }
@@ -127,7 +128,7 @@ impl Case {
         }
     }
 
-    /// The model of its teeth: each lies aside in its slot by the gap there, and so far back on the flank.
+    /// Returns the model's errors. Each tooth lies offset in its slot by the gap, and so farther back on the flank.
     fn errors_under(&self, load: &LoadParameters) -> Errors {
         let (parameters, _) = self.drive_and_torque_nm();
         let drive = Drive::new(&parameters).unwrap();
@@ -178,14 +179,14 @@ fn percent(share: f64) -> f64 {
 }
 
 #[test]
-fn single_contacts_have_the_pressure_of_hertz_and_the_approach_of_johnson() {
+fn single_contacts_match_hertz_pressure_and_johnson_approach() {
     for contact in results().single_contacts {
         let SingleContact { radius_mm, force_n_per_mm, depth_mm, pressure_mpa, approach_mm } = contact;
         let modulus_mpa = 210e3 / (1.0 - 0.3 * 0.3);
         let half_width_mm = (8.0 * force_n_per_mm * radius_mm / (PI * modulus_mpa)).sqrt();
         let hertz_mpa = 2.0 * force_n_per_mm / (PI * half_width_mm);
         assert!((pressure_mpa / hertz_mpa - 1.0).abs() < 0.015, "{pressure_mpa} MPa, by Hertz {hertz_mpa}");
-        // Both sides of the disc come nearer to it (docs/theory.md 4.3).
+        // Both sides of the disc approach it (docs/explanation/theory.md 4.3).
         let johnson_mm = force_n_per_mm / (PI * modulus_mpa)
             * (2.0 * (4.0 * radius_mm / half_width_mm).ln() - 1.0 + 2.0 * (2.0 * depth_mm / half_width_mm).ln()
                 - 0.3 / 0.7);
@@ -194,7 +195,7 @@ fn single_contacts_have_the_pressure_of_hertz_and_the_approach_of_johnson() {
 }
 
 #[test]
-fn finer_elements_change_nothing_that_is_compared() {
+fn finer_elements_change_no_compared_result() {
     let convergence = results().convergence;
     let [.., finer, finest] = &convergence[..] else { panic!("two refinements at least") };
     assert!((finer.force_n / finest.force_n - 1.0).abs() < 1e-3);
@@ -202,7 +203,7 @@ fn finer_elements_change_nothing_that_is_compared() {
 }
 
 #[test]
-fn the_default_model_agrees_with_elastic_bodies() {
+fn default_model_matches_elastic_bodies() {
     let cases = results().cases;
     assert_eq!(cases.len(), 20);
     for case in cases {
@@ -224,9 +225,9 @@ fn the_default_model_agrees_with_elastic_bodies() {
     }
 }
 
-/// What the model left out of these bodies was that the ring's teeth bend, and that the wave generator moves on under its teeth, which matters with gaps.
+/// The refinements are bending ring teeth and, with gaps, the moving wave generator.
 #[test]
-fn with_ring_teeth_that_bend_and_a_wave_generator_that_moves_the_model_agrees_within_a_half_per_cent() {
+fn refined_model_matches_elastic_bodies_more_closely() {
     for case in results().cases {
         for wave_generator_moves in [false, true] {
             let own = case.load(VirtualWork, case.johnson());
@@ -246,9 +247,9 @@ fn with_ring_teeth_that_bend_and_a_wave_generator_that_moves_the_model_agrees_wi
     }
 }
 
-/// What is told of a model is what was found of it: the ranges hold every error, and go no further than another calculation went.
+/// The reported ranges hold every error and are hardly wider.
 #[test]
-fn each_model_errs_as_much_as_it_says_that_it_does() {
+fn each_model_has_the_error_it_reports() {
     let cases = results().cases;
     let mut wrong = Vec::new();
     for (compatibility, law, ring_teeth_bend, wave_generator_moves) in [
@@ -290,7 +291,7 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
                 let named =
                     format!("{compatibility:?}, {law:?}, {refined}, {wanted:?}: {what} {least:+.4} to {largest:+.4}");
                 let is_held = low <= least && largest <= high;
-                // There an earlier calculation went further.
+                // An earlier calculation had a wider range there.
                 let slack = if has_pointed_tips && has_gaps && what == "force" { 0.045 } else { 0.015 };
                 if !is_held || low < least - 0.015 || high > largest + slack {
                     wrong.push(format!("{named}, told {low:+} to {high:+}"));
@@ -302,13 +303,13 @@ fn each_model_errs_as_much_as_it_says_that_it_does() {
 }
 
 #[test]
-fn the_larger_error_of_a_range_is_the_one_farther_from_none_on_either_side() {
+fn larger_error_of_range_has_larger_magnitude() {
     assert_eq!(ErrorRange { low: -0.05, high: 0.03 }.largest(), 0.05);
     assert_eq!(ErrorRange { low: -0.01, high: 0.03 }.largest(), 0.03);
 }
 
 #[test]
-fn beyond_the_largest_pressure_angle_that_was_calculated_a_drive_is_told_to_be() {
+fn pressure_angle_above_calculated_drives_is_reported() {
     let mut told = Vec::new();
     for semi_minor_mm in [49.5, 49.3, 49.1, 48.9] {
         let parameters = DriveParameters { wave_generator: ellipse(50.7, semi_minor_mm), ..PAPER_5_2 };
@@ -325,11 +326,10 @@ fn beyond_the_largest_pressure_angle_that_was_calculated_a_drive_is_told_to_be()
     assert!(told.contains(&true) && told.contains(&false), "{told:?}");
 }
 
-/// Few flat-lobed teeth with a gap turn by several degrees before they touch, and stand elsewhere then: against a rigid tooth that closes the gap at the place where it stands
-/// as the cam has moved on, the arms of the place without load make the largest force 1.6 and 5 % too small.
+/// A few teeth with flat lobes and a gap turn by several degrees before they touch. The unloaded lever arms then
+/// make the largest force 1.6 % and 5 % too small.
 #[test]
-fn where_teeth_are_moved_on_through_a_gap_by_more_than_in_the_drives_that_were_calculated_a_drive_is_told_to_be_beyond()
-{
+fn wind_up_above_calculated_drives_is_reported() {
     let path = |mean_path_radius_mm, amplitude_mm, tooth_radius_mm| DriveParameters {
         wave_generator: WaveGenerator::HarmonicPath { lobes: 2, mean_path_radius_mm, amplitude_mm },
         teeth: 10,
@@ -348,7 +348,8 @@ fn where_teeth_are_moved_on_through_a_gap_by_more_than_in_the_drives_that_were_c
         let case = LoadCase::new(&load).unwrap();
         let error = model_error::of(&drive, &case, &Deviations::default(), &sweep, None).unwrap();
         assert_eq!(error.beyond, [Beyond::WindUp]);
-        // d = R + e cos 2ψ: the cam turns by x until R + e cos 2(ψ - x) has risen by the gap over cos β, tan β = k T, and presses with the arm of that place.
+        // d = R + e cos 2ψ. The cam turns by x until R + e cos 2(ψ - x) has risen by the gap over cos β, where
+        // tan β = k T. It presses with the arm of that place.
         let WaveGenerator::HarmonicPath { mean_path_radius_mm, amplitude_mm, .. } = parameters.wave_generator else {
             unreachable!("made above");
         };
@@ -369,7 +370,7 @@ fn where_teeth_are_moved_on_through_a_gap_by_more_than_in_the_drives_that_were_c
             let closes = teeth.filter(|&psi| psi < 0.5 * PI).filter_map(|psi| Some((turned(psi)?, psi)));
             let (x, psi) = closes.min_by(|one, other| one.0.total_cmp(&other.0)).unwrap();
             let t = slope(psi - x) / d(psi - x);
-            // Two zones, the torque over the arm, which is that of the tangential part of F_H.
+            // Two zones share the torque. The arm belongs to the tangential part of F_H.
             0.5 * 1e-2 / (d(psi - x) * t) * t.hypot(1.0)
         };
         let rigid_n = (0..400).map(|step| force_n(f64::from(step) / 400.0 * 0.2 * PI)).fold(0.0, f64::max);
@@ -379,7 +380,7 @@ fn where_teeth_are_moved_on_through_a_gap_by_more_than_in_the_drives_that_were_c
 }
 
 #[test]
-fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
+fn only_calculated_drives_lie_within_range() {
     for case in results().cases {
         let (parameters, _) = case.drive_and_torque_nm();
         let drive = Drive::new(&parameters).unwrap();
@@ -389,13 +390,13 @@ fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
             let sweep = swept(parameters, load, INTERVALS);
             model_error::of(&drive, &LoadCase::new(load).unwrap(), &Deviations::default(), &sweep, None).unwrap().beyond
         };
-        // Of a drive with pointed tips the angles of entry are left out.
+        // For a drive with pointed tips, the angles of entry are not covered.
         let expected = if case.drive == "5.2" { vec![Beyond::EntryUnderLoad] } else { Vec::new() };
         assert_eq!(beyond(&parameters, &own), expected, "{}", case.name());
         if drive.lobes() == 2 && case.drive == "5.1" && !LoadCase::new(&own).unwrap().has_gaps() {
             let gaps = PerContact { ring: 10.5, ..PerContact::default() };
             assert_eq!(beyond(&parameters, &LoadParameters { clearance_um: gaps, ..own }), [Beyond::Gap]);
-            // The same drive a tenth as large: what is a gap there hangs on the size.
+            // At a tenth of the size the limit of a gap scales too.
             let small = DriveParameters {
                 wave_generator: ellipse(5.8, 5.6),
                 tooth_radius_mm: 0.5,
@@ -420,7 +421,7 @@ fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
             let mut brass = own;
             brass.materials.carrier.youngs_modulus_gpa = 100.0;
             assert_eq!(beyond(&parameters, &brass), [Beyond::Materials]);
-            // Near the root contacts are wider than where their stress is largest, and reach 0.035 of the radius from 85 N·m on.
+            // Near the root contacts are wider than at the largest stress: 0.035 of the radius above 85 N·m.
             for (torque_nm, expected) in [(80.0, vec![]), (100.0, vec![Beyond::HalfWidth])] {
                 let torque = Torque::Input(torque_nm);
                 assert_eq!(beyond(&parameters, &LoadParameters { torque, ..own }), expected, "{torque_nm} N·m");
@@ -429,11 +430,11 @@ fn the_drives_that_were_calculated_lie_within_the_range_and_others_do_not() {
                 beyond(&parameters, &LoadParameters { torque: Torque::Input(200.0), ..own }),
                 [Beyond::HalfWidth]
             );
-            // A law that is given little depth ends before.
+            // A law with a small depth ends earlier.
             let depth_mm = PerContact { ring: Some(0.5), ..PerContact::default() };
             let shallow = LoadParameters { law: ContactLaw::Johnson { depth_mm }, torque: Torque::Input(40.0), ..own };
             assert_eq!(beyond(&parameters, &shallow), [Beyond::HalfWidth]);
-            // Other laws err otherwise with any other size or load.
+            // Errors of other laws depend on size and load.
             for law in [ContactLaw::Palmgren, ContactLaw::Linear] {
                 assert_eq!(beyond(&parameters, &LoadParameters { law, ..own }), [Beyond::Law], "{law:?}");
             }

@@ -1,4 +1,4 @@
-//! Gaps of modified and deviating parts, against the real curves, moved.
+//! Gaps of modified and deviating parts, against the real curves after their motion.
 
 use std::f64::consts::PI;
 
@@ -17,7 +17,7 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, drive, ellipse, load, semi_axes_mm};
 
-/// Small enough for first order, large enough for its digits.
+/// A size small enough for first order, and large enough for accurate differences.
 const SMALL_UM: f64 = 1e-3;
 const SMALL_MM: f64 = 1e-6;
 const SMALL_ARCSEC: f64 = 1e-2;
@@ -31,7 +31,7 @@ fn unit(angle_rad: f64) -> Vector2<f64> {
     Vector2::new(angle_rad.cos(), angle_rad.sin())
 }
 
-/// The path of the teeth's centres around the cam, by the angle of the cam's normal, all the way around: no formula of the solver's.
+/// Returns the path of centres around the cam by the cam's normal angle, without the solver.
 fn path_at_normal(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
     let ((a, b), r) = (semi_axes_mm(p), p.tooth_radius_mm);
     let n = unit(normal_rad);
@@ -39,7 +39,7 @@ fn path_at_normal(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
     Vector2::new(a * a / h * n.x, b * b / h * n.y) + n * r
 }
 
-/// Distance of the centre at a position, by bisection of the normal's angle.
+/// Returns the centre's distance at a position, by bisection of the normal's angle.
 fn distance_at(p: &DriveParameters, position_rad: f64) -> f64 {
     let turn = (position_rad / PI).floor() * PI;
     let (mut low, mut high) = (turn - 0.6, turn + PI + 0.6);
@@ -61,7 +61,7 @@ fn distance_at(p: &DriveParameters, position_rad: f64) -> f64 {
     path_at_normal(p, 0.5 * (low + high)).norm()
 }
 
-/// The centres' path in the ring's frame, in a space, by position: shifted outward by `shift_mm` along its radii.
+/// Returns the path of centres in a ring space by position, shifted outward by `shift_mm` along its radii.
 fn path_in_ring(p: &DriveParameters, space: u64, position_rad: f64, shift_mm: f64) -> Vector2<f64> {
     let k = p.ring_teeth as f64 / 2.0;
     let s = if p.teeth > p.ring_teeth { 1.0 } else { -1.0 };
@@ -69,9 +69,9 @@ fn path_in_ring(p: &DriveParameters, space: u64, position_rad: f64, shift_mm: f6
     unit(angle) * (distance_at(p, position_rad) + shift_mm)
 }
 
-/// How far a point is from a curve on the side `outward` of it: along the curve's normal at the nearest point, by parabolas around `near`.
+/// Returns a point's signed distance from a curve along the normal at the nearest point, by parabolas around `near`.
 fn signed_distance(point: Vector2<f64>, outward: Vector2<f64>, near: f64, curve: impl Fn(f64) -> Vector2<f64>) -> f64 {
-    // The tangent by central differences; Newton's method on (P - C(t))·C'(t), for which a rough second difference is enough.
+    // The tangent is a central difference. Newton's method on (P - C(t))·C'(t) needs only a rough second difference.
     let tangent = |t: f64| (curve(t + 1e-5) - curve(t - 1e-5)) / 2e-5;
     let mut t = near;
     for _ in 0..30 {
@@ -102,7 +102,7 @@ fn tooth_of(drive: &Drive, degrees: f64) -> ToothState {
 
 const DEGREES: [f64; 5] = [3.0, 25.0, 45.0, 68.0, 86.0];
 
-/// The gap at the ring where its path has been moved by `moved`, and by `shift_mm` along its radii.
+/// Returns the gap at the ring after `moved` is applied to its path, shifted by `shift_mm` along its radii.
 fn gap_of_moved_ring(
     p: &DriveParameters,
     place: &Place,
@@ -117,12 +117,12 @@ fn gap_of_moved_ring(
 
 #[track_caller]
 fn assert_near(found_mm: f64, moved_mm: f64, size_mm: f64) {
-    // Second order in the size, and the digits of 60 mm at a millionth.
+    // Allows the second order in the size, and rounding of 60 mm over a millionth.
     assert!((found_mm - moved_mm).abs() < 1e-6 * size_mm, "{found_mm:e} is not {moved_mm:e}");
 }
 
 #[test]
-fn a_ring_of_a_shifted_path_or_turned_opens_the_gap_between_the_real_curves() {
+fn shifted_or_turned_ring_opens_real_gap() {
     for p in [PAPER_5_1, larger()] {
         let drive = drive(&p);
         let s = drive.sense();
@@ -147,7 +147,7 @@ fn a_ring_of_a_shifted_path_or_turned_opens_the_gap_between_the_real_curves() {
 }
 
 #[test]
-fn an_equidistant_ring_is_farther_from_the_tooth_by_as_much_and_a_profile_moved_along_its_radii_by_the_cosine() {
+fn equidistant_opens_full_gap_and_profile_shift_cosine() {
     for p in [PAPER_5_1, larger()] {
         let drive = drive(&p);
         for degrees in DEGREES {
@@ -156,7 +156,7 @@ fn an_equidistant_ring_is_farther_from_the_tooth_by_as_much_and_a_profile_moved_
             let none = Deviations::default();
             let position = degrees.to_radians();
             let center = path_in_ring(&p, 0, position, 0.0);
-            // The flank as points: the path's neighbours, and a radius along the normal.
+            // The flank as points: neighbours on the path, plus a radius along the normal.
             let flank = |t: f64, r: f64| {
                 let (before, after) = (path_in_ring(&p, 0, t - 1e-5, 0.0), path_in_ring(&p, 0, t + 1e-5, 0.0));
                 let along = (after - before).normalize();
@@ -181,7 +181,7 @@ fn an_equidistant_ring_is_farther_from_the_tooth_by_as_much_and_a_profile_moved_
 }
 
 #[test]
-fn parts_off_their_axis_open_and_close_the_gaps_between_the_real_curves() {
+fn runout_changes_gaps_between_real_curves() {
     for p in [PAPER_5_1, larger()] {
         let drive = drive(&p);
         let s = drive.sense();
@@ -195,14 +195,14 @@ fn parts_off_their_axis_open_and_close_the_gaps_between_the_real_curves() {
             for lobe in [0, 1] {
                 let place = Place { slot: 9, ring_space: 4, lobe };
                 let found = gaps_of(&drive, Modification::default(), &deviations, &place, &tooth);
-                // The cam's own frame: the tooth stands at the position from its lobe.
+                // In the cam's frame the tooth is at its position from the lobe.
                 let turn = PI * lobe as f64;
                 let center = unit(position + turn) * distance_at(&p, position);
                 let cam = signed_distance(center, center, position + turn, |t| path_at_normal(&p, t) + off);
                 assert_near(found.wave_generator, -cam, SMALL_MM);
                 let ring = gap_of_moved_ring(&p, &place, degrees, 0.0, |c| c + off);
                 assert_near(found.ring, ring, SMALL_MM);
-                // A plane wall at the tooth's side, forward of it for s = +1.
+                // A plane wall beside the tooth, ahead of it for s = +1.
                 let slot = 2.0 * PI * 9.0 / p.installed as f64;
                 let wall = Rotation2::new(slot) * Vector2::new(0.0, s);
                 assert_near(found.carrier, wall.dot(&off), SMALL_MM);
@@ -212,7 +212,7 @@ fn parts_off_their_axis_open_and_close_the_gaps_between_the_real_curves() {
 }
 
 #[test]
-fn walls_teeth_lobes_and_the_carriers_angle_open_the_gaps_that_they_name() {
+fn walls_teeth_lobes_and_rotation_open_their_gaps() {
     let drive = drive(&PAPER_5_1);
     let tooth = tooth_of(&drive, 40.0);
     let d = tooth.center.center_radius_mm;
@@ -251,7 +251,7 @@ fn walls_teeth_lobes_and_the_carriers_angle_open_the_gaps_that_they_name() {
 }
 
 #[test]
-fn tip_relief_starts_at_its_position_and_is_whole_at_the_flanks_end() {
+fn tip_relief_grows_from_start_to_flank_end() {
     let drive = drive(&PAPER_5_1);
     let relief = TipRelief { amount_um: 6.0, start_deg: 60.0, power: 2.0 };
     let modification = Modification { ring_tip_relief: Some(relief), ..Modification::default() };
@@ -268,7 +268,7 @@ fn tip_relief_starts_at_its_position_and_is_whole_at_the_flanks_end() {
 }
 
 #[test]
-fn a_turned_ring_or_carrier_is_lost_motion_alone() {
+fn turned_ring_or_carrier_is_lost_motion_alone() {
     // kτ and (Z_G/U)τ for every tooth alike: section 4.8.
     let drive = drive(&PAPER_5_1);
     let solved = |modification| {
@@ -295,7 +295,7 @@ fn a_turned_ring_or_carrier_is_lost_motion_alone() {
 }
 
 #[test]
-fn with_deviations_the_teeth_of_both_zones_share_the_load() {
+fn deviating_teeth_of_both_zones_share_load() {
     let drive = drive(&PAPER_5_1);
     let mesh = Mesh::new(&drive);
     let solved = |deviations: Option<&Deviations>, zones: u64| {
@@ -308,7 +308,7 @@ fn with_deviations_the_teeth_of_both_zones_share_the_load() {
         let mut teeth = Vec::new();
         for lobe in 0..zones {
             for placed in mesh.placed_at(1, Samples::new(4).unwrap()) {
-                // Half a turn on stand the teeth of the second lobe.
+                // The teeth of the second lobe are half a turn away.
                 let place = Place::new(&drive, placed.number + 14 * lobe, lobe);
                 teeth.push(loaded.tooth_at(&place, placed.position)?);
             }
@@ -322,7 +322,7 @@ fn with_deviations_the_teeth_of_both_zones_share_the_load() {
     };
     let (alike, half) = solved(None, 1).unwrap();
     assert!((2.0 * half / 20e3 - 1.0).abs() < 1e-14);
-    // A deviation where no loaded tooth stands changes nothing, but for the second zone in the list.
+    // A deviation at an unloaded tooth changes only the list, which has the second zone.
     let elsewhere =
         Deviations { slot_wall_um: (0..28).map(|i| f64::from(u8::from(i == 10))).collect(), ..Deviations::default() };
     let (both, torque) = solved(Some(&elsewhere), 2).unwrap();
@@ -330,21 +330,22 @@ fn with_deviations_the_teeth_of_both_zones_share_the_load() {
     for (one, other) in both.iter().zip(alike.iter().chain(&alike)) {
         assert!((one - other).abs() < 1e-9);
     }
-    // A cam off its axis loads one zone more than the other.
+    // A cam off its axis loads one zone more.
     let off = PerContact { wave_generator: Runout { amount_um: 2.0, angle_deg: 40.0 }, ..PerContact::default() };
     let (unlike, torque) = solved(Some(&Deviations { runout: off, ..Deviations::default() }), 2).unwrap();
     assert!((torque / 20e3 - 1.0).abs() < 1e-14);
     let sums: Vec<f64> = unlike.chunks(alike.len()).map(|zone| zone.iter().sum()).collect();
     assert!(sums[0] > 1.1 * sums[1], "{sums:?}");
-    // More than the clearance covers.
+    // The runout exceeds the clearance.
     let far = PerContact { wave_generator: Runout { amount_um: 60.0, angle_deg: 40.0 }, ..PerContact::default() };
     let refused = solved(Some(&Deviations { runout: far, ..Deviations::default() }), 2);
     assert!(matches!(refused, Err(SolveError::Interference { gap_um, .. }) if gap_um < 0.0), "{refused:?}");
 }
 
 #[test]
-fn the_space_of_a_tooth_follows_from_its_slot_and_lobe() {
-    // In the ring's frame the tooth stands at the middle of its space, less what its position is through the ring: checked by angles alone.
+fn ring_space_follows_from_slot_and_lobe() {
+    // In the ring's frame the tooth is at the middle of its space, minus its position through the ring. Only angles are
+    // used here.
     for p in [
         PAPER_5_1,
         larger(),
@@ -379,9 +380,9 @@ fn the_space_of_a_tooth_follows_from_its_slot_and_lobe() {
     }
 }
 
-/// A carrier turned by τ leaves room of `τ d` at every wall, some 11 µm here.
+/// A carrier turned by τ opens `τ d` at every wall, about 11 µm here.
 #[test]
-fn a_turned_carrier_makes_room_for_walls_that_are_too_full() {
+fn turned_carrier_makes_room_for_thick_walls() {
     let swept = |slot_wall_um, carrier_rotation_arcsec| {
         let modification = Modification { slot_wall_um, carrier_rotation_arcsec, ..Modification::default() };
         let case = LoadCase::new(&LoadParameters { modification, ..load(20.0, VirtualWork) }).unwrap();
@@ -393,7 +394,7 @@ fn a_turned_carrier_makes_room_for_walls_that_are_too_full() {
 }
 
 #[test]
-fn modification_and_deviations_need_virtual_work_and_lists_one_entry_for_each_item() {
+fn rejects_deviations_under_projection_or_of_wrong_length() {
     let modification = Modification { slot_wall_um: 1.0, ..Modification::default() };
     let refused = LoadCase::new(&LoadParameters { modification, ..load(20.0, Projection) }).unwrap_err();
     assert_eq!(refused, [Violation::NeedsVirtualWork { parameter: Parameter::Modification(Modified::SlotWall) }]);

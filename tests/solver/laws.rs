@@ -1,4 +1,4 @@
-//! Johnson's law, series compliance, balls and flats, against formulas and constructions of their own.
+//! Johnson's law, series compliance, balls and flats, against independent formulas and constructions.
 
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ fn johnson(torque_nm: f64) -> LoadParameters {
     LoadParameters { law: R_DEEP, ..load(torque_nm, VirtualWork) }
 }
 
-/// Titanium teeth between ceramic, cast iron and bronze, at depths of their own.
+/// Returns a load with titanium teeth, ceramic, cast iron and bronze parts, each with its own depth.
 fn mixed(torque_nm: f64) -> LoadParameters {
     let material = |youngs_modulus_gpa, poissons_ratio| Material { youngs_modulus_gpa, poissons_ratio };
     LoadParameters {
@@ -44,7 +44,7 @@ fn mixed(torque_nm: f64) -> LoadParameters {
     }
 }
 
-/// Johnson's approach as it is printed, with its half-width.
+/// Returns Johnson's printed approach and its half-width.
 fn printed_approach_mm(
     load: &LoadParameters,
     r: f64,
@@ -79,7 +79,7 @@ fn directions(drive: &Drive, tooth: &ToothState) -> [Vector2<f64>; 3] {
 
 const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
 
-/// The force under which a contact gives way so far, by bisection in its logarithm.
+/// Returns the force for an approach, by bisection in its logarithm.
 fn force_of(approach_mm: f64, law: impl Fn(f64) -> f64) -> f64 {
     if approach_mm <= 0.0 {
         return 0.0;
@@ -92,7 +92,7 @@ fn force_of(approach_mm: f64, law: impl Fn(f64) -> f64) -> f64 {
     (low * high).sqrt()
 }
 
-/// The three forces on a tooth whose centre is free: moved by Newton's method until its contacts, which press only, balance.
+/// Returns the forces on a tooth with a free centre. Newton's method moves it until its pressing contacts balance.
 fn free_tooth(
     drive: &Drive,
     tooth: &ToothState,
@@ -103,7 +103,7 @@ fn free_tooth(
     let along = directions(drive, tooth);
     let d = tooth.center.center_radius_mm;
     let pushed_mm = rotation_rad * d * tooth.center.tan_pressure_angle.atan().sin();
-    // How far each contact is pressed when the centre moves by v: the cam comes nearer by what it has turned.
+    // Approach of each contact if the centre moves by v. The cam comes nearer by its rotation.
     let pressed = |v: Vector2<f64>| {
         [
             pushed_mm - v.dot(&along[0]) - gap_mm.wave_generator,
@@ -119,7 +119,7 @@ fn free_tooth(
         let step = 1e-5 * force_n;
         2.0 * step / (law(CONTACTS[i], tooth, force_n + step) - law(CONTACTS[i], tooth, force_n - step))
     };
-    // Each contact at first takes the part that statics gives it, so that all three press.
+    // Starts with the shares of statics, so that all three contacts press.
     let mut v = {
         let reach = |ratio: f64, i: usize, f: f64| law(CONTACTS[i], tooth, f * ratio);
         let ratio = tooth.force_ratio;
@@ -142,7 +142,7 @@ fn free_tooth(
             .lu()
             .solve(&Vector2::new(ring, carrier))
             .unwrap()
-            // Somewhere beside the answer, or Newton's method would have nothing to do.
+            // Starts beside the solution, so that Newton's method has work.
             * 1.001
     };
     for _ in 0..60 {
@@ -163,7 +163,7 @@ fn free_tooth(
     forces(v)
 }
 
-/// The largest difference of the solver's forces from those of free teeth at its wind-up, over the peak, and of the torque they make.
+/// Returns the largest difference from free teeth at the solver's wind-up, in forces over the peak and in torque.
 fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters) -> f64 {
     let samples = Samples::new(3).unwrap();
     let drive = drive(parameters);
@@ -205,7 +205,7 @@ fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters)
 }
 
 #[test]
-fn johnsons_law_by_virtual_work_is_a_tooth_free_to_move_between_three_lines() {
+fn johnson_virtual_work_is_tooth_between_three_lines() {
     let with_gaps = |load: LoadParameters| LoadParameters {
         clearance_um: PerContact { wave_generator: 3.0, ring: 4.5, carrier: 6.0 },
         series_compliance_mm_per_n: PerContact { wave_generator: 0.0, ring: 1e-6, carrier: 7e-6 },
@@ -227,7 +227,7 @@ fn johnsons_law_by_virtual_work_is_a_tooth_free_to_move_between_three_lines() {
 }
 
 #[test]
-fn a_tooth_gives_way_by_johnsons_printed_formula_at_each_contact() {
+fn approach_follows_johnsons_printed_formula() {
     let load = mixed(20.0);
     let drive = drive(&PAPER_5_1);
     let case = LoadCase::new(&load).unwrap();
@@ -261,7 +261,7 @@ fn a_tooth_gives_way_by_johnsons_printed_formula_at_each_contact() {
 }
 
 #[test]
-fn case_5_1_by_virtual_work_and_johnson_stands_between_linear_and_palmgren() {
+fn johnson_lies_between_linear_and_palmgren() {
     let peak = |law| {
         let load = LoadParameters { law, ..load(20.0, VirtualWork) };
         let sweep = swept(&PAPER_5_1, &load, 50);
@@ -275,7 +275,7 @@ fn case_5_1_by_virtual_work_and_johnson_stands_between_linear_and_palmgren() {
 }
 
 #[test]
-fn under_johnsons_law_too_any_torque_up_to_its_end_and_any_gap_is_balanced() {
+fn johnsons_law_balances_any_torque_and_gap() {
     let mut worst = 0.0_f64;
     for parameters in [PAPER_5_1, PAPER_5_2] {
         for exponent in [-12, -8, -4, 0, 1] {
@@ -294,7 +294,7 @@ fn under_johnsons_law_too_any_torque_up_to_its_end_and_any_gap_is_balanced() {
 }
 
 #[test]
-fn johnsons_law_ends_where_a_contact_is_half_as_wide_as_the_tooth_and_says_at_which_torque() {
+fn johnsons_law_ends_at_half_width_with_torque() {
     let flats = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
     for drive in [drive(&PAPER_5_1), drive(&DriveParameters { tooth: flats, ..PAPER_5_1 })] {
         johnsons_law_ends_at_the_ring(&drive);
@@ -309,7 +309,7 @@ fn johnsons_law_ends_at_the_ring(drive: &Drive) {
         panic!("{refused:?}")
     };
     assert_eq!(half_width_limit_mm, 2.5);
-    // Just below the torque that it names the first input angle has an answer, with that half-width; just above it has none.
+    // Just below the reported torque the first input angle has an answer with that half-width. Just above it has none.
     let loaded = |torque_nm: f64| {
         let case = LoadCase::new(&johnson(torque_nm)).unwrap();
         let loaded = LoadedDrive::new(drive, &case).unwrap();
@@ -326,14 +326,14 @@ fn johnsons_law_ends_at_the_ring(drive: &Drive) {
     };
     assert!((loaded(input_torque_limit_nm * (1.0 - 1e-9)).unwrap() / 2.5 - 1.0).abs() < 1e-8);
     assert!(loaded(input_torque_limit_nm * (1.0 + 1e-9)).is_err());
-    // A capacity beyond is none.
+    // No capacity exists beyond the law's end.
     let parameters = LoadParameters { allowable_stress_mpa: Some(everywhere(1e6)), ..johnson(20.0) };
     let refused = sweep::sweep(drive, &LoadCase::new(&parameters).unwrap(), Points::samples(4).unwrap(), &Never);
     assert!(matches!(refused, Err(SolveError::JohnsonBeyondHalfWidth { .. })), "{refused:?}");
 }
 
 #[test]
-fn a_contact_wider_than_a_tenth_of_the_tooth_is_a_finding() {
+fn contact_above_tenth_of_tooth_is_a_finding() {
     let found = |load: &LoadParameters| {
         let drive = drive(&PAPER_5_1);
         let sweep = swept(&PAPER_5_1, load, 10);
@@ -359,7 +359,7 @@ fn a_contact_wider_than_a_tenth_of_the_tooth_is_a_finding() {
     assert!(matches!(found(&shallow)[..], [Finding::JohnsonBeyondHalfWidth { contact: Contact::Carrier, .. }]));
 }
 
-/// Laws without a closed form, with gaps.
+/// Returns laws without a closed form, with gaps.
 fn laws_of_searches() -> [LoadParameters; 3] {
     let gapped = |load: LoadParameters| LoadParameters {
         clearance_um: PerContact { wave_generator: 0.0, ring: 10.0, carrier: 2.0 },
@@ -374,7 +374,7 @@ fn laws_of_searches() -> [LoadParameters; 3] {
 }
 
 #[test]
-fn stiffness_is_the_slope_of_torque_over_wind_up_and_capacity_the_torque_at_which_the_stress_is_reached() {
+fn stiffness_is_torque_slope_and_capacity_meets_stress() {
     for load in laws_of_searches() {
         let at = |torque_nm: f64| {
             let load = LoadParameters { torque: toothwave_solver::Torque::Input(torque_nm), ..load };
@@ -396,7 +396,7 @@ fn stiffness_is_the_slope_of_torque_over_wind_up_and_capacity_the_torque_at_whic
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_finds_the_peaks_of_these_laws_too() {
+fn tolerance_sweep_finds_peaks_under_these_laws() {
     for load in laws_of_searches() {
         let case = LoadCase::new(&load).unwrap();
         let points = Points::tolerance(1e-6, 1_000_000).unwrap();
@@ -407,7 +407,7 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_these_laws_too() {
             for (found, sampled) in
                 [(peaks.force_n.value, sampled.force_n.value), (peaks.stress_mpa.value, sampled.stress_mpa.value)]
             {
-                // Samples miss a kink by as much as they are apart.
+                // Samples miss a kink by up to their distance.
                 assert!(found >= sampled * (1.0 - 1e-6) && found <= sampled * (1.0 + 2e-4), "{found} {sampled}");
             }
         }
@@ -415,7 +415,7 @@ fn a_sweep_to_a_tolerance_finds_the_peaks_of_these_laws_too() {
 }
 
 #[test]
-fn projection_takes_neither_johnsons_law_nor_a_series_compliance() {
+fn projection_rejects_johnsons_law_and_series_compliance() {
     let refused = |parameters: LoadParameters| LoadCase::new(&parameters).unwrap_err();
     let projected = LoadParameters { law: R_DEEP, ..load(20.0, Projection) };
     assert_eq!(refused(projected), [Violation::NeedsVirtualWork { parameter: Parameter::Law }]);
@@ -430,7 +430,7 @@ fn projection_takes_neither_johnsons_law_nor_a_series_compliance() {
 }
 
 #[test]
-fn a_series_compliance_is_a_softer_stiffness_where_the_law_is_linear() {
+fn series_compliance_softens_linear_stiffness() {
     let stiffness = PerContact { wave_generator: 4e5, ring: 6e5, carrier: 2e5 };
     let series = PerContact { wave_generator: 1e-6, ring: 2e-6, carrier: 3e-6 };
     let springy = LoadParameters {
@@ -455,7 +455,7 @@ fn a_series_compliance_is_a_softer_stiffness_where_the_law_is_linear() {
 }
 
 #[test]
-fn a_ball_on_a_plane_approaches_as_the_closed_form_of_hertz_says() {
+fn ball_on_plane_has_hertz_closed_form_approach() {
     let (r, modulus) = (5.0_f64, 115e3_f64);
     let circle = EllipticContact::new(1.0 / r, 1.0 / r, modulus).unwrap();
     let sum = 2.0 / r;
@@ -477,7 +477,7 @@ fn a_ball_on_a_plane_approaches_as_the_closed_form_of_hertz_says() {
     assert!((below.share - 0.310).abs() < 5e-4 && (below.depth - 0.481).abs() < 1e-3, "{below:?}");
 }
 
-/// The complete elliptic integrals of both kinds, by the arithmetic-geometric mean, for a complementary modulus.
+/// Returns both complete elliptic integrals of a complementary modulus, by the arithmetic-geometric mean.
 fn elliptic_integrals(complement: f64) -> [f64; 2] {
     let (mut a, mut b, mut weight, mut sum) = (1.0, complement, 0.5, 0.5 * (1.0 - complement) * (1.0 + complement));
     for _ in 0..8 {
@@ -491,7 +491,7 @@ fn elliptic_integrals(complement: f64) -> [f64; 2] {
 }
 
 #[test]
-fn the_half_axes_and_the_approach_of_any_ellipse_are_those_of_its_elliptic_integrals_to_the_last_digits() {
+fn ellipse_axes_and_approach_match_elliptic_integrals() {
     let (modulus_mpa, force_n) = (115e3, 100.0);
     for exponent in 1..60 {
         let (large, small) = (0.3, 0.3 * 10_f64.powf(-0.05 * f64::from(exponent)));
@@ -505,16 +505,16 @@ fn the_half_axes_and_the_approach_of_any_ellipse_are_those_of_its_elliptic_integ
         let cubed_mm3 = 3.0 * force_n * second / (PI * modulus_mpa * (large + small) * ratio * ratio);
         let approach_mm = force_n.powf(2.0 / 3.0) * ellipse.coefficient();
         let expected_mm = 1.5 * force_n * first / (PI * modulus_mpa * long_mm);
-        // Differences of integrals lose digits to a nearly round ellipse.
+        // Differences of integrals lose digits for a nearly round ellipse.
         assert!((curvatures / (large / small) - 1.0).abs() < 1e-14 / m, "{ratio}: {curvatures}");
         assert!((long_mm.powi(3) / cubed_mm3 - 1.0).abs() < 1e-14, "{ratio}: {long_mm} mm");
         assert!((approach_mm / expected_mm - 1.0).abs() < 1e-14, "{ratio}: {approach_mm} mm");
     }
 }
 
-/// Of two bodies that swap materials the contact stays what it is; the material of the lower Poisson's ratio is sheared more, whichever it is.
+/// If two bodies swap materials, the contact stays. The body with the lower Poisson's ratio has the larger shear.
 #[test]
-fn the_shear_below_a_balls_contact_is_that_of_the_body_in_which_it_is_larger() {
+fn ball_contact_shear_is_larger_bodys() {
     let material = |poissons_ratio| Material { youngs_modulus_gpa: 200.0, poissons_ratio };
     let ball = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm: PerContact::default() }, ..PAPER_5_1 };
     let peaks = |of_teeth, of_parts| {
@@ -532,7 +532,7 @@ fn the_shear_below_a_balls_contact_is_that_of_the_body_in_which_it_is_larger() {
 }
 
 #[test]
-fn a_very_long_ellipse_is_sheared_like_a_line() {
+fn very_long_ellipse_is_sheared_like_line() {
     let long = EllipticContact::new(1.0, 1e-20, 1e5).unwrap();
     for nu in [0.0, 0.3, 0.45] {
         let below = long.shear_below(nu);
@@ -541,8 +541,8 @@ fn a_very_long_ellipse_is_sheared_like_a_line() {
     }
 }
 
-/// The deflection of a half-space at `(x, y)` under Hertz's pressure of unit peak over an ellipse of half-axes `long`, `short`, times π E*: the sum of
-/// the pressure along all lines through the point. Over a chord from the point, at the angle t, the pressure is the root of a quadratic.
+/// Returns the deflection of a half-space at `(x, y)`, times π E*, under Hertz's pressure of unit peak over an ellipse.
+/// It sums the pressure along all lines through the point. On each chord the pressure is the root of a quadratic.
 fn half_space_deflection(long: f64, short: f64, x: f64, y: f64) -> f64 {
     const STEPS: u32 = 20_000;
     let mut sum = 0.0;
@@ -559,7 +559,7 @@ fn half_space_deflection(long: f64, short: f64, x: f64, y: f64) -> f64 {
 }
 
 #[test]
-fn hertzs_pressure_over_the_ellipse_makes_the_two_bodies_touch_all_over_it() {
+fn hertz_pressure_closes_whole_contact_ellipse() {
     let modulus = 115e3;
     for (in_plane, axial) in [(0.4, 0.4 - 1e-9), (0.4, 0.2), (0.3, 0.008), (0.02, 0.2), (5.0, 0.008)] {
         let force_n = 730.0;
@@ -579,11 +579,11 @@ fn hertzs_pressure_over_the_ellipse_makes_the_two_bodies_touch_all_over_it() {
 }
 
 #[test]
-fn a_flat_gives_way_as_the_mean_of_an_evenly_pressed_rectangle() {
+fn flat_approach_is_mean_under_uniform_pressure() {
     let modulus = 115e3;
     for (length, width) in [(4.0_f64, 15.0_f64), (3.0, 3.0), (15.0, 4.0), (1e-4, 10.0)] {
         let flat = FlatContact::new(length, width);
-        // Over the distances (u, v) of two points, each (l - u)(L - v) often: in the corner u = v = 0 by polar coordinates.
+        // Over the distances (u, v) of two points, each with weight (l - u)(L - v). Polar coordinates at u = v = 0.
         let steps = 400;
         let nodes = |n: u32| (0..n).map(move |i| (f64::from(i) + 0.5) / f64::from(n));
         let corner = (width / length).atan();
@@ -621,7 +621,7 @@ fn a_flat_gives_way_as_the_mean_of_an_evenly_pressed_rectangle() {
 }
 
 #[test]
-fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
+fn flat_sided_teeth_work_with_any_cylinder_law() {
     let drive = drive(&PAPER_5_1);
     let shape = |outer_mm| ToothContact::FlatSided {
         flat_length_mm: 4.0,
@@ -652,16 +652,15 @@ fn flat_sided_teeth_share_the_load_with_any_law_of_cylinders() {
     assert!(matches!(left, Err(SolveError::FlatOffCarrier { .. })), "{left:?}");
 }
 
-/// They were borne by the default carrier, whatever radii the designer gave.
 #[test]
-fn a_flat_bears_half_its_length_on_either_side() {
+fn flat_half_width_is_half_its_length() {
     let tooth = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 6.0 };
     let peaks = swept(&DriveParameters { tooth, ..PAPER_5_1 }, &johnson(20.0), 4).peaks;
     assert!((peaks.carrier.half_width_mm / 3.0 - 1.0).abs() < 1e-14);
 }
 
 #[test]
-fn flats_are_borne_by_the_carrier_that_is_given() {
+fn given_carrier_bears_the_flats() {
     let flat_length_mm = 4.0;
     let parameters = DriveParameters { tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm }, ..PAPER_5_1 };
     let drive = drive(&parameters);
@@ -672,7 +671,7 @@ fn flats_are_borne_by_the_carrier_that_is_given() {
         assert!(load.carrier_violations(&draft).is_empty());
         let found = sweep::sweep(&drive, &LoadCase::new(&load).unwrap(), Points::samples(8).unwrap(), &Never).unwrap();
         assert!(found.torque_balance_residual < 1e-14);
-        // Between the cam at 58 mm and the tips at 66 mm, a tenth of the room free on either side.
+        // Between the cam at 58 mm and the tips at 66 mm, with a tenth of the space free on each side.
         let (inner_mm, outer_mm) = (inner_mm.unwrap_or(58.8), outer_mm.unwrap_or(65.2));
         for state in 0..found.states.len() {
             let d = found.states.center_radius_mm[state];
@@ -701,15 +700,14 @@ fn flats_are_borne_by_the_carrier_that_is_given() {
             Err(SolveError::Impossible(violations)) => assert_eq!(parameter(&violations), at_fault),
             other => panic!("{other:?}"),
         }
-        // Cylinders do not ask for it.
+        // Cylinders do not depend on the carrier.
         let cylinders = crate::drives::drive(&PAPER_5_1);
         assert!(sweep::sweep(&cylinders, &case, Points::samples(8).unwrap(), &Never).is_ok());
     }
 }
 
-/// The flat's linear part was left out where its weight is negative, and forces leave the model by as much.
 #[test]
-fn flat_sided_teeth_are_projected_only_where_no_part_of_their_approach_is_negative() {
+fn flat_projection_needs_non_negative_approach_terms() {
     let flat = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
     let forward = DriveParameters { tooth: flat, ..PAPER_5_1 };
     let backward = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..forward };
@@ -744,7 +742,7 @@ fn flat_sided_teeth_are_projected_only_where_no_part_of_their_approach_is_negati
 }
 
 #[test]
-fn palmgrens_law_is_not_questioned_at_a_flat_which_does_not_take_it() {
+fn palmgrens_law_is_not_questioned_at_flats() {
     let bronze = Material { youngs_modulus_gpa: 110.0, poissons_ratio: 0.34 };
     let flat = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
     let mut parameters = LoadParameters { law: ContactLaw::Palmgren, ..load(20.0, VirtualWork) };
@@ -763,7 +761,7 @@ fn palmgrens_law_is_not_questioned_at_a_flat_which_does_not_take_it() {
 }
 
 #[test]
-fn balls_take_hertz_or_fixed_and_no_other_tooth_takes_hertz() {
+fn only_balls_take_hertz_beside_fixed() {
     let drive = drive(&PAPER_5_1);
     let ball = ToothContact::Ball { groove_radius_mm: PerContact::default() };
     let accepts = |law, shape: &ToothContact| {
@@ -786,7 +784,7 @@ proptest! {
     #![proptest_config(cases(512))]
 
     #[test]
-    fn a_stress_is_that_of_its_force_for_every_ellipse(one in -6.0_f64..3.0, other in -6.0_f64..3.0, power in -6.0_f64..6.0) {
+    fn stress_matches_force_for_every_ellipse(one in -6.0_f64..3.0, other in -6.0_f64..3.0, power in -6.0_f64..6.0) {
         let contact = EllipticContact::new(10.0_f64.powf(one), 10.0_f64.powf(other), 1.1e5).unwrap();
         let force_n = 10.0_f64.powf(power);
         prop_assert!((contact.force_n(contact.stress_mpa(force_n)) / force_n - 1.0).abs() < 1e-14);

@@ -1,4 +1,4 @@
-//! What cannot exist, and what must be said of what can.
+//! Impossible parameters, and findings about possible ones.
 
 use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::{
@@ -18,7 +18,7 @@ fn violations(parameters: &DriveParameters) -> Vec<Violation> {
 }
 
 #[test]
-fn a_value_out_of_range_is_written_as_a_person_would() {
+fn value_out_of_range_is_written_readably() {
     let told = |tooth_radius_mm| {
         let found = violations(&DriveParameters { tooth_radius_mm, ..PAPER_5_1 });
         let of_radius = |v: &&Violation| matches!(v, Violation::OutOfRange { parameter: Parameter::ToothRadius, .. });
@@ -30,7 +30,7 @@ fn a_value_out_of_range_is_written_as_a_person_would() {
 }
 
 #[test]
-fn every_impossible_value_is_named_at_once() {
+fn reports_all_impossible_values_at_once() {
     let parameters = DriveParameters {
         wave_generator: ellipse(56.0, 58.0),
         teeth: 28,
@@ -53,7 +53,7 @@ fn every_impossible_value_is_named_at_once() {
 }
 
 #[test]
-fn neighbouring_teeth_may_not_touch() {
+fn neighbouring_teeth_must_not_touch() {
     let touching = violations(&DriveParameters { tooth_radius_mm: 7.2, ..PAPER_5_1 });
     let [Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, .. }] = touching[..] else {
         panic!("{touching:?}")
@@ -70,8 +70,8 @@ fn neighbouring_teeth_may_not_touch() {
 }
 
 #[test]
-fn of_three_teeth_around_an_ellipse_those_either_side_of_its_major_axis_are_nearest() {
-    // A third of a turn apart, they stand nearer to the minor axis than the pair that straddles it.
+fn three_teeth_are_nearest_across_major_axis() {
+    // A third of a turn apart, they are nearer to the minor axis than the pair on both sides of it.
     let p = DriveParameters {
         wave_generator: ellipse(58.0, 50.0),
         teeth: 12,
@@ -96,7 +96,7 @@ fn of_three_teeth_around_an_ellipse_those_either_side_of_its_major_axis_are_near
     assert!((told - least).abs() < 1e-12 * least, "{told} is not {least}");
 }
 
-/// The radius above which teeth touch, of which a drive with teeth of such a radius is told.
+/// Returns the touching radius that the violation of these parameters reports.
 fn touching_radius_mm(parameters: &DriveParameters) -> f64 {
     let found = violations(parameters);
     let radius = found.iter().find_map(|violation| match violation {
@@ -114,7 +114,7 @@ fn teeth_touch(parameters: &DriveParameters) -> bool {
     }
 }
 
-/// Drives whose teeth touch: round and elliptic, with few teeth and many, slots left out, and the ends of the ranges.
+/// Returns drives with touching teeth: round and elliptic, few and many teeth, empty slots, and ends of ranges.
 fn touching_drives() -> Vec<DriveParameters> {
     let of = |semi_major_mm, semi_minor_mm, teeth, installed, tooth_radius_mm| DriveParameters {
         wave_generator: ellipse(semi_major_mm, semi_minor_mm),
@@ -142,7 +142,7 @@ fn touching_drives() -> Vec<DriveParameters> {
 }
 
 #[test]
-fn teeth_just_thinner_than_the_radius_that_is_told_do_not_touch_and_just_thicker_ones_do() {
+fn reported_touching_radius_is_the_threshold() {
     assert!((touching_radius_mm(&DriveParameters { tooth_radius_mm: 9.0, ..PAPER_5_1 }) - 7.06).abs() < 0.01);
     for p in touching_drives() {
         let limit = touching_radius_mm(&p);
@@ -153,9 +153,9 @@ fn teeth_just_thinner_than_the_radius_that_is_told_do_not_touch_and_just_thicker
 }
 
 #[test]
-fn the_radius_at_which_teeth_touch_is_that_of_a_search_among_points_of_the_cam() {
-    // Independent of the solver's path: the cam's points by the ellipse's parameter, centres along their normals, and a bisection over
-    // the radius of the least distance of pairs whose polar angles differ by one spacing.
+fn touching_radius_matches_search_on_cam_points() {
+    // Independent of the solver's path: cam points by the ellipse's parameter, and centres along their normals.
+    // Bisection over the radius uses the least distance of pairs whose polar angles differ by one spacing.
     for p in touching_drives() {
         let (a, b) = semi_axes_mm(&p);
         if p.installed > 100 || a > 10.0 * b {
@@ -208,7 +208,7 @@ fn thicker_teeth_have_narrower_gaps() {
         let mut last = f64::INFINITY;
         for share in 1..40 {
             let tooth_radius_mm = limit * f64::from(share) / 40.0;
-            // Wide enough a bore that no thin tooth wants for an annulus.
+            // A wide bore, so that thin teeth leave an annulus.
             let Ok(drive) = Drive::new(&DriveParameters {
                 tooth_radius_mm,
                 tip_radius_mm: Some(semi_axes_mm(&p).0 + tooth_radius_mm),
@@ -225,7 +225,7 @@ fn thicker_teeth_have_narrower_gaps() {
 }
 
 #[test]
-fn a_number_of_teeth_that_cannot_be_comes_with_those_beside_it_that_can() {
+fn impossible_tooth_count_has_possible_neighbours() {
     let beside = |teeth, installed, ring_teeth| -> Vec<_> {
         let found = violations(&DriveParameters { teeth, installed, ring_teeth, ..PAPER_5_1 });
         found
@@ -247,7 +247,7 @@ fn a_number_of_teeth_that_cannot_be_comes_with_those_beside_it_that_can() {
 }
 
 #[test]
-fn of_the_numbers_beside_one_that_cannot_be_the_nearer_is_proposed_and_of_two_as_near_the_lower() {
+fn proposes_nearest_count_and_lower_on_tie() {
     let proposed = |teeth, installed, ring_teeth| {
         let found = violations(&DriveParameters { teeth, installed, ring_teeth, ..PAPER_5_1 });
         let nearest = found.iter().find_map(|violation| match violation {
@@ -266,7 +266,7 @@ fn of_the_numbers_beside_one_that_cannot_be_the_nearer_is_proposed_and_of_two_as
 }
 
 #[test]
-fn projection_on_a_steep_flank_is_a_finding() {
+fn projection_on_steep_flank_is_a_finding() {
     let load = LoadCase::new(&load(20.0, Compatibility::Projection)).unwrap();
     let told = [PAPER_5_1, PAPER_5_2, DriveParameters { wave_generator: ellipse(58.0, 57.8), ..PAPER_5_1 }].map(|p| {
         let drive = drive(&p);
@@ -279,7 +279,7 @@ fn projection_on_a_steep_flank_is_a_finding() {
 }
 
 #[test]
-fn an_allowable_stress_out_of_range_is_told_once_where_the_contacts_share_it() {
+fn shared_allowable_stress_is_reported_once() {
     let told = |wave_generator, ring, carrier| -> Vec<_> {
         let allowable_stress_mpa = Some(PerContact { wave_generator, ring, carrier });
         let load = LoadParameters { allowable_stress_mpa, ..load(20.0, Compatibility::Projection) };
@@ -296,7 +296,7 @@ fn an_allowable_stress_out_of_range_is_told_once_where_the_contacts_share_it() {
 }
 
 #[test]
-fn a_draft_has_the_violations_for_which_the_drive_is_refused() {
+fn draft_has_the_violations_of_its_drive() {
     for p in [DriveParameters { tooth_radius_mm: 7.2, ..PAPER_5_1 }, DriveParameters { ring_teeth: 27, ..PAPER_5_1 }] {
         assert_eq!(Draft::new(&p).unwrap().violations(), violations(&p));
     }
@@ -304,9 +304,9 @@ fn a_draft_has_the_violations_for_which_the_drive_is_refused() {
 }
 
 #[test]
-fn a_wind_up_beyond_a_tenth_of_the_period_is_a_finding() {
+fn wind_up_beyond_model_is_a_finding() {
     let drive = drive(&PAPER_5_1);
-    // A carrier turned by τ takes up Z_G/U = 14 of it, and a light load nothing more.
+    // A carrier turned by τ gives a wind-up of Z_G/U = 14 times τ, and a light load adds nothing.
     let found = |carrier_rotation_arcsec| {
         let modification = Modification { carrier_rotation_arcsec, ..Modification::default() };
         let load = LoadParameters { modification, ..load(1e-9, Compatibility::VirtualWork) };
@@ -319,7 +319,7 @@ fn a_wind_up_beyond_a_tenth_of_the_period_is_a_finding() {
 }
 
 #[test]
-fn a_stress_above_what_is_allowed_at_its_contact_is_a_finding() {
+fn stress_above_allowable_is_a_finding() {
     let allowable = PerContact { wave_generator: 800.0, ring: 5000.0, carrier: 5000.0 };
     let load = LoadParameters { allowable_stress_mpa: Some(allowable), ..load(20.0, Compatibility::Projection) };
     let peaks = swept(&PAPER_5_1, &load, 10).peaks;
@@ -328,9 +328,9 @@ fn a_stress_above_what_is_allowed_at_its_contact_is_a_finding() {
     assert_eq!(found, [Finding::StressAboveAllowable { contact, stress_mpa, allowable_mpa: 800.0 }]);
 }
 
-/// A groove of the radius `r_g`, half a ball's radius t deep, is `2√(t (2r_g - t))` wide at its edges.
+/// A groove of radius `r_g`, half a ball's radius t deep, is `2√(t (2r_g - t))` wide at its edges.
 #[test]
-fn a_contact_longer_than_its_groove_is_wide_is_a_finding() {
+fn contact_longer_than_groove_width_is_a_finding() {
     let groove_radius_mm = PerContact { wave_generator: Some(5.2), ring: None, carrier: None };
     let parameters = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm }, ..PAPER_5_1 };
     let load = LoadParameters { law: ContactLaw::Hertz, ..load(1.0, Compatibility::VirtualWork) };
@@ -344,9 +344,9 @@ fn a_contact_longer_than_its_groove_is_wide_is_a_finding() {
     assert!(!is_told(&found(edge_mm - 1e-9)) && is_told(&found(edge_mm + 1e-9)));
 }
 
-/// Hertz and Palmgren of a steel cylinder at the wave generator, L1 = 15 mm, and the moduli of partners of another material.
+/// Hertz and Palmgren for a steel cylinder at the wave generator, L1 = 15 mm, and moduli of other materials.
 #[test]
-fn findings_about_contacts_have_the_numbers_of_their_formulas() {
+fn contact_findings_have_formula_values() {
     let drive = drive(&PAPER_5_1);
     let found = |load: &LoadParameters, approaches_matter| {
         let peaks = swept(&PAPER_5_1, load, 10).peaks;
@@ -374,27 +374,27 @@ fn findings_about_contacts_have_the_numbers_of_their_formulas() {
 }
 
 #[test]
-fn any_divisor_of_the_teeth_may_be_installed() {
+fn any_divisor_of_teeth_may_be_installed() {
     for (teeth, installed) in [(28, 7), (27, 27), (27, 9), (28, 14)] {
         assert!(Drive::new(&DriveParameters { teeth, installed, ring_teeth: teeth - 2, ..PAPER_5_1 }).is_ok());
     }
 }
 
 #[test]
-fn without_an_annulus_there_is_no_carrier() {
+fn carrier_needs_an_annulus() {
     let p = DriveParameters { wave_generator: ellipse(60.0, 48.0), tooth_radius_mm: 1.0, ..PAPER_5_1 };
     assert!(matches!(violations(&p)[..], [Violation::NoCarrierAnnulus { .. }]));
 }
 
 #[test]
-fn a_bore_must_leave_some_flank() {
+fn bore_must_leave_some_flank() {
     let bored = |tip_radius_mm| DriveParameters { tip_radius_mm: Some(tip_radius_mm), ..PAPER_5_1 };
     assert!(matches!(violations(&bored(68.0))[..], [Violation::BoreLeavesNoFlank { root_radius_mm: 68.0, .. }]));
     assert!(Drive::new(&bored(67.999)).is_ok());
 }
 
 #[test]
-fn four_teeth_have_a_geometry_but_no_sweep() {
+fn four_teeth_have_geometry_but_no_sweep() {
     let p = DriveParameters {
         teeth: 4,
         installed: 4,
@@ -409,7 +409,7 @@ fn four_teeth_have_a_geometry_but_no_sweep() {
 }
 
 #[test]
-fn teeth_on_a_path_that_is_given_touch_where_their_radius_passes_half_the_chord_of_its_valley() {
+fn teeth_on_given_path_touch_at_valley_chord() {
     // d_v sin(π/28) with d_v = 59 mm.
     let half_chord_mm = 59.0 * (std::f64::consts::PI / 28.0).sin();
     let touches = |share: f64| {
@@ -425,7 +425,7 @@ fn teeth_on_a_path_that_is_given_touch_where_their_radius_passes_half_the_chord_
 }
 
 #[test]
-fn stiffnesses_that_differ_much_make_projection_meaningless_and_virtual_work_does_not_care() {
+fn unequal_stiffnesses_break_projection_but_not_virtual_work() {
     let mut soft_ring = load(20.0, Compatibility::Projection);
     soft_ring.law = ContactLaw::Fixed(PerContact { wave_generator: 1e9, ring: 1e9, carrier: 1e3 });
     let p = DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..PAPER_5_1 };
@@ -439,7 +439,7 @@ fn stiffnesses_that_differ_much_make_projection_meaningless_and_virtual_work_doe
 }
 
 #[test]
-fn a_load_names_every_value_out_of_range() {
+fn load_reports_every_value_out_of_range() {
     let mut parameters = load(20.0, Compatibility::Projection);
     parameters.torque = Torque::Output(0.0);
     parameters.materials.ring.poissons_ratio = 0.5;
@@ -455,12 +455,12 @@ fn not_a_number_is_out_of_every_range() {
 }
 
 #[test]
-fn a_sound_drive_has_no_findings() {
+fn sound_drive_has_no_findings() {
     assert_eq!(findings::of_drive(&drive(&PAPER_5_1)).unwrap(), []);
 }
 
 #[test]
-fn undercut_is_a_finding_and_a_bore_beyond_it_says_so() {
+fn undercut_is_a_finding_and_notes_larger_bore() {
     let found = findings::of_drive(&drive(&PAPER_5_2)).unwrap();
     assert!(matches!(found[..], [Finding::Undercut { is_bored_away: false, .. }]), "{found:?}");
     let found = findings::of_drive(&drive(&PAPER_5_2_BORED)).unwrap();
@@ -471,11 +471,11 @@ fn undercut_is_a_finding_and_a_bore_beyond_it_says_so() {
 }
 
 #[test]
-fn a_bore_inside_the_natural_tip_changes_nothing_but_is_a_finding() {
+fn bore_inside_natural_tip_is_only_a_finding() {
     let p = DriveParameters { tip_radius_mm: Some(65.9), ..PAPER_5_1 };
     let found = findings::of_drive(&drive(&p)).unwrap();
     assert!(matches!(found[..], [Finding::BoreWithoutEffect { .. }]), "{found:?}");
-    // A bore that just meets the natural tip says what is there anyway.
+    // A bore at the natural tip has no effect.
     let exact = drive(&DriveParameters { tip_radius_mm: Some(66.0), ..PAPER_5_1 });
     assert_eq!(findings::of_drive(&exact).unwrap(), []);
     let load = load(20.0, Compatibility::Projection);
@@ -483,7 +483,7 @@ fn a_bore_inside_the_natural_tip_changes_nothing_but_is_a_finding() {
 }
 
 #[test]
-fn a_sweep_cannot_be_asked_for_no_points_for_too_many_or_for_a_tolerance_that_is_none() {
+fn rejects_impossible_sample_count_or_tolerance() {
     for count in [0, 10_000_001, u64::MAX] {
         assert!(matches!(Points::samples(count), Err(Violation::OutOfRange { parameter: Parameter::Samples, .. })));
     }
@@ -496,7 +496,7 @@ fn a_sweep_cannot_be_asked_for_no_points_for_too_many_or_for_a_tolerance_that_is
 }
 
 #[test]
-fn a_position_lies_in_the_quarter_turn_from_the_major_to_the_minor_axis() {
+fn position_lies_between_major_and_minor_axis() {
     assert_eq!(Position::of_turn(1, 4, 2), Some(Position::valley(2)));
     assert_eq!(Position::of_turn(0, 4, 2), Some(Position::lobe(2)));
     for (numerator, denominator) in [(1, 2), (1, 0), (0, 0), (u64::MAX, u64::MAX), (26, 100)] {
@@ -510,15 +510,15 @@ fn a_position_lies_in_the_quarter_turn_from_the_major_to_the_minor_axis() {
 }
 
 #[test]
-fn a_sweep_stops_when_it_is_told_to() {
+fn sweep_stops_on_request() {
     let stop = std::sync::atomic::AtomicBool::new(true);
     let load = LoadCase::new(&load(20.0, Compatibility::Projection)).unwrap();
     assert_eq!(sweep::sweep(&drive(&PAPER_5_1), &load, Points::samples(50).unwrap(), &stop), Err(SolveError::Stopped));
 }
 
 #[test]
-fn a_tooth_of_the_critical_radius_or_a_few_roundings_beside_it_is_a_drive() {
-    // Found by fuzzing: rounding alone decides here on which side of the threshold the drive is.
+fn radii_around_critical_radius_give_a_drive() {
+    // Found by fuzzing: rounding decides on which side of the threshold the drive is.
     let known = DriveParameters {
         wave_generator: ellipse(46.8, 42.0),
         teeth: 16,
@@ -557,7 +557,7 @@ fn a_tooth_of_the_critical_radius_or_a_few_roundings_beside_it_is_a_drive() {
 }
 
 #[test]
-fn a_gap_is_questionable_by_projection_and_not_by_virtual_work() {
+fn gap_is_a_finding_under_projection_only() {
     let found = |compatibility| {
         let gaps = PerContact { wave_generator: 0.0, ring: 10.0, carrier: 4.0 };
         let load = LoadParameters { clearance_um: gaps, ..load(20.0, compatibility) };

@@ -76,7 +76,7 @@ impl Case {
             .collect()
     }
 
-    /// Friction of an entry, its coefficients times a factor, with the mechanism that its teeth make.
+    /// Returns an entry's friction, with coefficients times a factor, and its mechanism.
     fn friction(&self, entry: &Value, factor: f64) -> (Mechanism, Friction) {
         let coefficient = per_contact(&entry["coefficient"]);
         let bearing = RaceBearing {
@@ -102,7 +102,7 @@ impl Case {
     }
 }
 
-/// Three numbers in the order of the contacts.
+/// Reads three numbers in the order of the contacts.
 fn per_contact(values: &Value) -> PerContact<f64> {
     PerContact {
         wave_generator: number(&values[0]).unwrap(),
@@ -116,7 +116,7 @@ fn assert_near(found: f64, expected: f64, allowed: f64, what: &str) {
 }
 
 #[test]
-fn slip_rolling_and_losses_are_those_of_an_exact_equilibrium_with_vanishing_friction() {
+fn losses_match_exact_equilibrium_with_vanishing_friction() {
     let mut compared = 0;
     for case in Case::all() {
         let teeth = case.teeth();
@@ -135,7 +135,7 @@ fn slip_rolling_and_losses_are_those_of_an_exact_equilibrium_with_vanishing_fric
             for (index, slip) in turning.teeth.iter().enumerate() {
                 let expected = per_contact(&limit["slip_mm_per_rad"][index]);
                 let rolls = limit["rolls"][index].as_str();
-                // Where the race's speed lets two contacts roll at once either may be named.
+                // If the race's speed lets two contacts roll at once, either may be named.
                 let is_named = |contact: Contact| {
                     rolls == Some(code(contact)) || expected.get(contact).abs() < 1e-10 * way && rolls.is_some()
                 };
@@ -172,7 +172,7 @@ const fn code(contact: Contact) -> &'static str {
     }
 }
 
-/// First-order efficiencies with the names that friction.json has for them.
+/// Returns first-order efficiencies with their names in friction.json.
 fn efficiencies(mechanism: &Mechanism, loss_ratio: f64) -> [(&'static str, Fixed, f64); 6] {
     let of = |fixed| mechanism.efficiency(fixed, loss_ratio);
     [
@@ -185,18 +185,18 @@ fn efficiencies(mechanism: &Mechanism, loss_ratio: f64) -> [(&'static str, Fixed
     ]
 }
 
-/// The loss over the power at the driven end that makes an efficiency.
+/// Returns the loss over the power at the driven end for an efficiency.
 fn loss_share_of(name: &str, efficiency: f64) -> f64 {
     if name.ends_with("back_driven") { 1.0 - efficiency } else { 1.0 / efficiency - 1.0 }
 }
 
 #[test]
-fn losses_err_by_the_square_of_the_coefficients() {
+fn loss_error_is_quadratic_in_coefficients() {
     let (mut compared, mut least, mut most) = (0, f64::INFINITY, 0.0_f64);
     for case in Case::all() {
         let teeth = case.teeth();
         for entry in case.frictions() {
-            // Over the loss itself, so that one order is left.
+            // Relative to the loss itself, so one order remains.
             let errors: Vec<_> = entry["exact"].as_array().unwrap()[1..]
                 .iter()
                 .map(|exact| {
@@ -210,7 +210,7 @@ fn losses_err_by_the_square_of_the_coefficients() {
                 .collect();
             for (coarse, fine) in errors[0].iter().zip(errors[1]) {
                 let name = format!("{} / {}: from {coarse:e} to {fine:e}", case.name(), entry["name"]);
-                // A quarter of the coefficients. Where orders cancel each other the first of them shows later.
+                // A quarter of the coefficients. If orders cancel, the first order shows later.
                 assert!(fine.abs() < 0.34 * coarse.abs() + 1.5e-3, "{name}");
                 if coarse.abs() > 0.01 {
                     (least, most) = (least.min(fine / coarse), most.max(fine / coarse));
@@ -226,7 +226,7 @@ fn losses_err_by_the_square_of_the_coefficients() {
 }
 
 #[test]
-fn efficiencies_err_by_no_more_than_is_told() {
+fn efficiency_error_is_within_reported_bound() {
     let mut nearest = 0.0_f64;
     let mut beyond = 0;
     for case in Case::all() {
@@ -254,7 +254,7 @@ fn efficiencies_err_by_no_more_than_is_told() {
 }
 
 #[test]
-fn the_error_that_is_told_holds_up_to_a_coefficient_and_less_where_the_cam_drags() {
+fn reported_efficiency_error_has_range_of_validity() {
     let spinning = mechanism(&PAPER_5_1);
     let flat_sided = Mechanism { tooth_spins: false, ..spinning };
     let race = |on_balls| WaveGeneratorFriction::Race { coefficient: 0.08, bearing: bearing_of_5_1(on_balls) };
@@ -268,7 +268,7 @@ fn the_error_that_is_told_holds_up_to_a_coefficient_and_less_where_the_cam_drags
     assert_eq!(told(&spinning, &with(rolling, 0.1)), (2.5 * 0.1 * 0.25, true));
     assert_eq!(told(&flat_sided, &with(rolling, 0.1)), (9.5 * 0.1 * 0.25, true));
     assert!(!told(&spinning, &with(rolling, 0.101)).1);
-    // 57/52 of these stand for the race's radius over the bearing's.
+    // The factor 57/52 is the race's radius over the bearing's.
     let (light, _) = told(&spinning, &with(race(0.01 * 57.0 / 52.0), 0.05));
     assert_near(light, (2.5 * 0.08 + 10.0 * 0.01) * 0.25, 1e-15, "light bearing");
     let (stiff, is_within) = told(&spinning, &with(race(0.09 * 57.0 / 52.0), 0.05));
@@ -277,7 +277,7 @@ fn the_error_that_is_told_holds_up_to_a_coefficient_and_less_where_the_cam_drags
 }
 
 #[test]
-fn the_point_of_contact_moves_over_each_part_as_its_curve_says() {
+fn contact_point_moves_along_each_curve() {
     for case in Case::all() {
         let placed = case.0["placed"].as_array().unwrap();
         for (tooth, row) in case.teeth().iter().zip(placed) {
@@ -286,7 +286,7 @@ fn the_point_of_contact_moves_over_each_part_as_its_curve_says() {
             for contact in CONTACTS {
                 let expected = *expected.get(contact);
                 let what = format!("{} at {contact:?}", case.name());
-                // 1 + rκ itself is given to half a unit in its last place.
+                // 1 + rκ has half a unit of error in its last place.
                 assert_near(*found.get(contact), expected, 1e-13 * expected, &what);
             }
         }
@@ -294,7 +294,7 @@ fn the_point_of_contact_moves_over_each_part_as_its_curve_says() {
 }
 
 #[test]
-fn the_radial_force_is_the_sum_of_the_teeths_forces() {
+fn radial_force_is_sum_of_tooth_forces() {
     for case in Case::all() {
         let (mechanism, teeth) = (case.mechanism(true), case.teeth());
         let total: f64 = teeth.iter().map(|tooth| tooth.force_n.wave_generator).sum();
@@ -311,7 +311,7 @@ fn the_radial_force_is_the_sum_of_the_teeths_forces() {
     }
 }
 
-/// The teeth in mesh of one zone, as the load sharing makes them.
+/// Returns the loaded teeth of one zone from the load sharing.
 fn teeth_at(loaded: &LoadedDrive<'_>, sample: u64, samples: u64) -> Vec<LoadedTooth> {
     let mesh = Mesh::new(loaded.drive());
     let states: Vec<_> = mesh
@@ -342,7 +342,7 @@ fn bearing_of_5_1(coefficient: f64) -> RaceBearing {
     RaceBearing { coefficient, radius_mm: 52.0 }
 }
 
-/// The mean of ν over 40 intervals of a period, `virtual_work`, 20 N·m.
+/// Returns the mean of ν over 40 intervals of a period, by `virtual_work` at 20 N·m.
 fn mean_loss_ratio(parameters: &DriveParameters, mechanism: &Mechanism, friction: &Friction) -> f64 {
     let drive = drive(parameters);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
@@ -359,7 +359,7 @@ fn mean_loss_ratio(parameters: &DriveParameters, mechanism: &Mechanism, friction
 }
 
 #[test]
-fn case_5_1_loses_half_of_its_power_on_a_plain_cam_and_an_eighth_on_a_bearing() {
+fn case_5_1_loses_known_shares_of_power() {
     let mechanism = mechanism(&PAPER_5_1);
     let efficiency = |friction: Friction| {
         let loss_ratio = mean_loss_ratio(&PAPER_5_1, &mechanism, &friction);
@@ -376,7 +376,7 @@ fn case_5_1_loses_half_of_its_power_on_a_plain_cam_and_an_eighth_on_a_bearing() 
 }
 
 #[test]
-fn power_in_is_power_out_and_what_is_lost() {
+fn input_power_equals_output_power_plus_losses() {
     let mechanism = mechanism(&PAPER_5_2);
     for friction in [plain(0.01, 0.02), plain(0.08, 0.1)] {
         let drive = drive(&PAPER_5_2);
@@ -385,7 +385,8 @@ fn power_in_is_power_out_and_what_is_lost() {
         let turning = mechanism.turning(&friction, &teeth_at(&loaded, 3, 20));
         let turning_rad_per_s = mechanism.turning_rad_per_s(1500.0);
         let lost_w = power_w(turning.lost_nmm_per_rad(), turning_rad_per_s);
-        // Speeds of wave generator, ring and carrier against the member that stands still, at this speed of the first against the last.
+        // Speeds of wave generator, ring and carrier against the fixed member, at this speed of the first
+        // against the last.
         let k = mechanism.ring_teeth_per_wave();
         let (cam, ring) = (turning_rad_per_s, -mechanism.sense() / k * turning_rad_per_s);
         for fixed in Fixed::ALL {
@@ -394,7 +395,7 @@ fn power_in_is_power_out_and_what_is_lost() {
                 Fixed::Carrier => 0.0,
                 Fixed::WaveGenerator => cam,
             };
-            // The torques without friction, of the teeth on the three; each driven end keeps its own.
+            // Torques without friction of the teeth on the three members. Each driven end keeps its own.
             let torque_nm = [-3.0, 3.0 * k * -mechanism.sense(), 3.0 * (k + mechanism.sense()) * mechanism.sense()];
             let powers_w = [torque_nm[0] * (cam - still), torque_nm[1] * (ring - still), torque_nm[2] * -still];
             assert!(powers_w.iter().sum::<f64>().abs() < 1e-10);
@@ -406,7 +407,7 @@ fn power_in_is_power_out_and_what_is_lost() {
     }
 }
 
-/// What a turn takes at a given speed of the race, each tooth's spin found among all three that let a contact roll.
+/// Returns the loss per radian at a given race speed. Each tooth's spin is the best of those with one rolling contact.
 fn lost_at(mechanism: &Mechanism, friction: &FrictionParameters, teeth: &[LoadedTooth], race_mm_per_rad: f64) -> f64 {
     let (WaveGeneratorFriction::Race { coefficient, .. } | WaveGeneratorFriction::Plain { coefficient }) =
         friction.wave_generator
@@ -441,7 +442,7 @@ proptest! {
     #![proptest_config(cases(96))]
 
     #[test]
-    fn the_race_turns_as_fast_as_loses_least(
+    fn race_speed_minimises_losses(
         parameters in any_swept_drive(),
         on_race in 0.0_f64..0.2, ring in 0.0_f64..0.2, carrier in 0.0_f64..0.2, on_balls in 0.0_f64..0.1,
         tooth_spins in any::<bool>(), sample in 0_u64..7, other in -2.0_f64..2.0,
@@ -469,7 +470,7 @@ proptest! {
     }
 
     #[test]
-    fn a_tooth_that_cannot_spin_loses_no_less_and_a_stuck_race_is_a_cam(
+    fn tooth_that_cannot_spin_loses_no_less(
         parameters in any_swept_drive(), on_cam in 0.001_f64..0.2, elsewhere in 0.001_f64..0.2, sample in 0_u64..7,
     ) {
         let drive = drive(&parameters);
@@ -487,7 +488,7 @@ proptest! {
         let stuck = spinning.turning(&with(race(2.0 * on_cam), elsewhere), &teeth);
         prop_assert_eq!(stuck.race_mm_per_rad, 0.0);
         prop_assert_eq!(stuck.lost_nmm_per_rad(), lost(&spinning, &friction));
-        // A race that is free loses less than the cam, and no less than one that does not rub on the teeth at all.
+        // A free race loses less than the cam, and at least as much as a race without rubbing.
         let free = lost(&spinning, &with(race(0.0), elsewhere));
         let rolling = lost(&spinning, &with(WaveGeneratorFriction::Rolling { bearing: bearing(0.0) }, elsewhere));
         prop_assert!(free <= lost(&spinning, &friction) * (1.0 + 1e-14));
@@ -496,7 +497,7 @@ proptest! {
 }
 
 #[test]
-fn a_tooth_without_load_loses_nothing_and_rolls_on_nothing() {
+fn unloaded_tooth_loses_nothing() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -512,9 +513,9 @@ fn a_tooth_without_load_loses_nothing_and_rolls_on_nothing() {
     assert_eq!(more.loss_ratio(), all.loss_ratio());
 }
 
-/// The worn section of each part by two ways: depth over its flanks, and what the teeth take off. Teeth that cannot spin slip everywhere.
+/// Teeth that cannot spin slip at all parts.
 #[test]
-fn what_a_part_loses_is_what_the_teeth_take_off_it() {
+fn worn_section_equals_material_removed_by_teeth() {
     let drive = drive(&PAPER_5_2);
     let load = LoadCase::new(&load(3.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -537,14 +538,14 @@ fn what_a_part_loses_is_what_the_teeth_take_off_it() {
             let depth = mechanism.wear_mm_per_hour(&friction, &wear, tooth, slip, &line_load);
             let advance = mechanism.advance_mm_per_rad(tooth);
             worn = PerContact::of(|contact| worn.get(contact) + depth.get(contact) * advance.get(contact) * step_rad);
-            // Friction's work without its coefficient, in N·m an hour, over all teeth of both zones.
+            // Friction work without its coefficient, in N·m an hour, over all teeth of both zones.
             taken = PerContact::of(|contact| {
                 let sliding_nm = 1e-3 * tooth.force_n.get(contact) * slip.slip_mm_per_rad.get(contact).abs();
                 taken.get(contact) + 2.0 / samples as f64 * rate / width_mm * sliding_nm * turning_rad_per_s * 3600.0
             });
         }
     }
-    // Loaded flanks: of the cam one a lobe, of the ring one a space, of the carrier one a slot.
+    // Loaded flanks: one for each lobe, ring space and slot.
     for (contact, flanks) in [(Contact::WaveGenerator, 2.0), (Contact::Ring, 78.0), (Contact::Carrier, 40.0)] {
         let (worn_mm2, taken_mm2) = (flanks * worn.get(contact), *taken.get(contact));
         assert!(taken_mm2 > 0.0, "{contact:?}");
@@ -553,7 +554,7 @@ fn what_a_part_loses_is_what_the_teeth_take_off_it() {
 }
 
 #[test]
-fn with_any_member_fixed_power_goes_through_and_torques_balance() {
+fn power_and_torques_balance_for_any_fixed_member() {
     for (teeth, installed, ring_teeth, lobes) in
         [(28, 28, 26, 2_u32), (28, 14, 30, 2), (28, 28, 27, 1), (33, 11, 36, 3)]
     {
@@ -565,7 +566,8 @@ fn with_any_member_fixed_power_goes_through_and_torques_balance() {
         let (drive, mechanism) = (drive(&p), mechanism(&p));
         assert_eq!(mechanism.speed_ratio(Fixed::Ring), drive.transmission_ratio());
         assert_eq!(mechanism.speed_ratio(Fixed::Carrier), drive.transmission_ratio_carrier_fixed());
-        // While the wave generator turns once, seen from the carrier, the ring turns by U teeth: any turning of all is added on top.
+        // During one turn of the wave generator against the carrier, the ring turns by U teeth. A common rotation
+        // is added.
         let (own, ring, carrier) = (1.0, -f64::from(lobes) * drive.sense() / ring_teeth as f64, 0.0);
         for (fixed, driving, driven, standing) in [
             (Fixed::Ring, own, carrier, ring),
@@ -582,7 +584,7 @@ fn with_any_member_fixed_power_goes_through_and_torques_balance() {
 }
 
 #[test]
-fn a_race_wears_all_round() {
+fn race_wears_evenly_around() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -602,13 +604,13 @@ fn a_race_wears_all_round() {
             mechanism.wear_mm_per_hour(&friction, &wear, tooth, slip, &line_load).wave_generator
         })
         .sum();
-    // Volume over surface: friction's work over its coefficient is force times way.
+    // Volume over surface: friction work over its coefficient is force times distance.
     let way_nm_per_h = 1e-3 * turning.work_nmm_per_rad.wave_generator / 0.05 * wear.turning_rad_per_s * 3600.0;
     assert_near(depth_mm, 2e-6 * way_nm_per_h / (2.0 * PI * 57.0 * 15.0), 1e-12 * depth_mm, "depth");
 }
 
 #[test]
-fn a_tooth_that_cannot_spin_wears_its_slot_by_its_line_load_a_pass() {
+fn slot_wear_follows_line_load_per_pass() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -629,7 +631,7 @@ fn a_tooth_that_cannot_spin_wears_its_slot_by_its_line_load_a_pass() {
 }
 
 #[test]
-fn pressure_times_velocity_is_the_hertz_pressure_at_the_slip() {
+fn pressure_times_velocity_is_hertz_pressure_times_slip() {
     let case = &Case::all()[0];
     let turning = case.mechanism(true).turning(&plain(0.03, 0.05), &case.teeth());
     let stress_mpa = PerContact { wave_generator: 800.0, ring: 900.0, carrier: 500.0 };
@@ -643,23 +645,23 @@ fn pressure_times_velocity_is_the_hertz_pressure_at_the_slip() {
 }
 
 #[test]
-fn a_bearing_lasts_as_iso_281_says() {
+fn bearing_life_follows_iso_281() {
     assert_near(RollingElement::Ball.life_h(10_000.0, 1_000.0, 1_000.0), 1e9 / 60e3, 1e-8, "ball");
     let roller = RollingElement::Roller.life_h(10_000.0, 1_000.0, 1_000.0);
     assert_near(roller, 1e6 * 10.0_f64.powf(10.0 / 3.0) / 60e3, 1e-7, "roller");
     assert_eq!(RollingElement::Ball.life_h(10_000.0, 0.0, 1_000.0), f64::INFINITY);
-    // Half of the turns without load: the other half decides, and P falls by the cube root of two.
+    // Half of the turns are unloaded, so P falls by the cube root of two.
     let loads = [(2_000.0, 1.0), (0.0, 1.0)].map(|(load_n, revolutions)| LoadForRevolutions { load_n, revolutions });
     assert_near(RollingElement::Ball.mean_load_n(&loads), 2_000.0 / 2.0_f64.cbrt(), 1e-9, "mean load");
     assert_eq!(RollingElement::Ball.mean_load_n(&loads[1..]), 0.0);
 }
 
 #[test]
-fn a_duty_uses_up_a_bearings_life_point_by_point() {
+fn duty_sums_bearing_damage_over_points() {
     let points = [(0.5, 1500.0, 800.0), (0.3, 300.0, 3000.0), (0.2, 3000.0, 100.0)]
         .map(|(share_of_time, speed_rpm, mean_load_n)| BearingLoadForTime { share_of_time, speed_rpm, mean_load_n });
     for element in [RollingElement::Ball, RollingElement::Roller] {
-        // Palmgren and Miner: each hour takes its share of the life that it would have alone.
+        // Palmgren and Miner: each hour uses its share of the life under that load alone.
         let used: f64 = points
             .iter()
             .map(|point| point.share_of_time / element.life_h(9e3, point.mean_load_n, point.speed_rpm))
@@ -669,7 +671,7 @@ fn a_duty_uses_up_a_bearings_life_point_by_point() {
 }
 
 #[test]
-fn a_duty_adds_energies_and_depths_where_they_are() {
+fn duty_adds_energies_and_local_depths() {
     let mechanism = mechanism(&PAPER_5_1);
     let points = [(0.5, 1500.0, 20.0, 0.08), (0.25, 300.0, 60.0, 0.2), (0.25, 3000.0, 5.0, 0.05)].map(
         |(share_of_time, input_speed_rpm, input_torque_nm, loss_ratio)| DutyPoint {
@@ -692,18 +694,18 @@ fn a_duty_adds_energies_and_depths_where_they_are() {
     assert_near(mechanism.efficiency(Fixed::Ring, duty.loss_ratio).driven, taken_w / given_w, 1e-14, "efficiency");
     assert_near(duty.power_loss_w, lost_w, 1e-12 * lost_w, "power");
     assert_near(duty.input_speed_rpm, speed_rpm, 1e-12 * speed_rpm, "speed");
-    // Shares need not be of one.
+    // Shares need not add up to one.
     let doubled = points.map(|point| DutyPoint { share_of_time: 2.0 * point.share_of_time, ..point });
     assert_eq!(mechanism.duty(&doubled), duty);
 
     let early = ColumnForTime { share_of_time: 3.0, column: &[4.0, 0.0, 1.0] };
     let late = ColumnForTime { share_of_time: 1.0, column: &[0.0, 8.0, 1.0] };
-    // The greatest depth is 3, not the 5 that the mean of the greatest would be.
+    // The greatest depth is 3. The mean of the greatest depths would be 5.
     assert_eq!(mean_at_each_place(&[early, late]), [3.0, 2.0, 1.0]);
 }
 
 #[test]
-fn a_mean_over_a_period_counts_its_ends_half_and_a_jump_twice() {
+fn period_mean_halves_ends_and_splits_jumps() {
     let column = |points: &[(f64, f64)]| -> Vec<AtInputAngle> {
         points.iter().map(|&(input_angle, value)| AtInputAngle { input_angle, value }).collect()
     };
@@ -712,7 +714,7 @@ fn a_mean_over_a_period_counts_its_ends_half_and_a_jump_twice() {
 }
 
 #[test]
-fn impossible_friction_is_refused_with_every_value() {
+fn impossible_friction_reports_every_value() {
     let bearing = RaceBearing { coefficient: 2.0, radius_mm: 0.0 };
     let parameters = FrictionParameters {
         wave_generator: WaveGeneratorFriction::Race { coefficient: -0.1, bearing },
@@ -737,7 +739,7 @@ fn impossible_friction_is_refused_with_every_value() {
 }
 
 #[test]
-fn friction_of_nothing_takes_nothing() {
+fn zero_friction_loses_nothing() {
     let case = &Case::all()[0];
     let Turning { teeth, work_nmm_per_rad, .. } = case.mechanism(true).turning(&plain(0.0, 0.0), &case.teeth());
     assert!(teeth.iter().all(|slip| slip.rolls.is_none()));
@@ -746,7 +748,7 @@ fn friction_of_nothing_takes_nothing() {
 }
 
 #[test]
-fn a_period_loses_what_its_input_angles_lose_one_by_one() {
+fn period_loss_is_mean_over_input_angles() {
     for parameters in [PAPER_5_1, PAPER_5_2] {
         let (drive, mechanism) = (drive(&parameters), mechanism(&parameters));
         let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
@@ -772,9 +774,9 @@ fn a_period_loses_what_its_input_angles_lose_one_by_one() {
     }
 }
 
-/// With gaps the arms of the teeth are others by per cent, once the wave generator has moved on.
+/// With gaps the moved wave generator changes the teeth's lever arms by per cent.
 #[test]
-fn what_is_lost_is_what_the_forces_lose_at_their_slips_where_the_wave_generator_moves() {
+fn losses_equal_force_times_slip_with_moving_generator() {
     let drive = drive(&PAPER_5_2);
     let load = LoadCase::new(&LoadParameters {
         clearance_um: everywhere(5.0),
@@ -792,14 +794,14 @@ fn what_is_lost_is_what_the_forces_lose_at_their_slips_where_the_wave_generator_
             let slip_mm = losses.slip_mm_per_rad.get(contact)[state].abs();
             coefficient.get(contact) * states.force_n.get(contact)[state] * slip_mm
         });
-        // Of two zones that are alike, under 3 N·m.
+        // Two alike zones under 3 N·m.
         let expected = 2.0 * lost_nmm.sum::<f64>() / 3000.0;
         assert_near(loss_ratio, expected, 1e-12 * expected, "loss ratio");
     }
 }
 
 #[test]
-fn pressure_times_velocity_peaks_where_the_product_of_a_state_is_largest() {
+fn pressure_times_velocity_peak_is_largest_product() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let sweep = sweep(&drive, &load, Points::samples(40).unwrap(), &Never).unwrap();
@@ -807,7 +809,7 @@ fn pressure_times_velocity_peaks_where_the_product_of_a_state_is_largest() {
     let peaks = losses.pressure_velocity_peaks(&sweep, 50.0);
     for contact in CONTACTS {
         let products = sweep.states.stress_mpa.get(contact).iter().zip(losses.slip_mm_per_rad.get(contact));
-        // Both in mm, turned into metres.
+        // Both are in mm and are converted to metres.
         let values: Vec<_> = products.map(|(stress_mpa, slip)| stress_mpa * (slip * 50.0).abs() / 1000.0).collect();
         let largest = values.iter().copied().fold(0.0, f64::max);
         let peak = peaks.get(contact);
@@ -818,14 +820,14 @@ fn pressure_times_velocity_peaks_where_the_product_of_a_state_is_largest() {
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_loses_what_many_samples_lose() {
+fn tolerance_sweep_loses_as_many_samples() {
     for parameters in [PAPER_5_1, PAPER_5_2] {
         let drive = drive(&parameters);
         let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
         let mean = |points| {
             let sweep = sweep(&drive, &load, points, &Never).unwrap();
             let losses = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), &Never).unwrap();
-            // Where a tooth enters the angle stands twice, and counts twice here too.
+            // At a tooth's entry the angle appears twice and counts twice here too.
             assert_eq!(losses.loss_ratio.len(), sweep.input_angles.input_angle_deg.len());
             losses.mean.total()
         };
@@ -839,7 +841,7 @@ fn a_sweep_to_a_tolerance_loses_what_many_samples_lose() {
 }
 
 #[test]
-fn a_race_runs_around_each_kind_of_cam_at_its_mean_radius() {
+fn race_runs_at_mean_radius_of_cam() {
     let radius_mm = |wave_generator: WaveGenerator| wave_generator.race_radius_mm(4.0);
     assert_eq!(radius_mm(WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 }), 57.0);
     assert_eq!(radius_mm(WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 }), 30.8);
@@ -851,7 +853,7 @@ fn a_race_runs_around_each_kind_of_cam_at_its_mean_radius() {
 }
 
 #[test]
-fn the_radial_force_of_a_sweep_is_that_of_the_torque_on_an_eccentric_and_none_on_lobes_alike() {
+fn sweep_radial_force_follows_torque_on_eccentric_only() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
         teeth: 28,
@@ -875,7 +877,7 @@ fn the_radial_force_of_a_sweep_is_that_of_the_torque_on_an_eccentric_and_none_on
     };
     assert_across(forces(&parameters, &rigid).unwrap(), 1e-8);
     assert_eq!(forces(&PAPER_5_1, &rigid), None);
-    // To second order in the wind-up where the wave generator moves on under its teeth; what is lost motion alone moves nothing.
+    // Exact to second order in the wind-up if the wave generator moves. Lost motion alone moves nothing.
     let gap = PerContact { ring: 8.0, ..PerContact::default() };
     let moving = LoadParameters { clearance_um: gap, wave_generator_moves: true, ..rigid };
     let turned = Modification { ring_rotation_arcsec: 60.0, ..Modification::default() };
@@ -885,7 +887,7 @@ fn the_radial_force_of_a_sweep_is_that_of_the_torque_on_an_eccentric_and_none_on
 }
 
 #[test]
-fn losses_of_a_sweep_stop_when_told_to() {
+fn losses_stop_on_request() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let sweep = sweep(&drive, &load, Points::samples(4).unwrap(), &Never).unwrap();
@@ -893,7 +895,7 @@ fn losses_of_a_sweep_stop_when_told_to() {
     assert_eq!(stopped, Err(SolveError::Stopped));
 }
 
-/// What wears at 1000 revolutions a minute, with rates that tell the parts apart.
+/// Returns wear parameters at 1000 rpm, with a different rate for each part.
 fn wear_parameters(mechanism: &Mechanism) -> WearParameters {
     WearParameters {
         rate_mm3_per_nm: PerContact { wave_generator: 1e-6, ring: 2e-6, carrier: 3e-6 },
@@ -902,7 +904,7 @@ fn wear_parameters(mechanism: &Mechanism) -> WearParameters {
 }
 
 #[test]
-fn a_sweep_wears_each_part_as_its_states_do_and_a_race_all_round() {
+fn sweep_wear_is_that_of_its_states() {
     let (drive, mechanism) = (drive(&PAPER_5_1), mechanism(&PAPER_5_1));
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -955,7 +957,7 @@ fn a_sweep_wears_each_part_as_its_states_do_and_a_race_all_round() {
 }
 
 #[test]
-fn a_duty_wears_each_place_by_its_mean_and_not_by_the_mean_of_the_largest() {
+fn duty_wear_peaks_after_averaging_each_place() {
     let wear = |ring: [f64; 2], race| Wear {
         mm_per_hour: PerContact { wave_generator: Vec::new(), ring: ring.into(), carrier: vec![1.0, 2.0] },
         race_mm_per_hour: Some(race),
@@ -967,7 +969,7 @@ fn a_duty_wears_each_place_by_its_mean_and_not_by_the_mean_of_the_largest() {
 }
 
 #[test]
-fn a_ball_wears_its_groove_by_the_pressure_that_passes_over_its_middle() {
+fn ball_wears_groove_by_pressure_over_its_middle() {
     let shape =
         ToothShape::Ball { groove_radius_mm: PerContact { wave_generator: Some(5.4), ring: Some(5.3), carrier: None } };
     let parameters = DriveParameters { tooth: shape, ..PAPER_5_1 };
@@ -976,7 +978,7 @@ fn a_ball_wears_its_groove_by_the_pressure_that_passes_over_its_middle() {
         LoadCase::new(&LoadParameters { law: ContactLaw::Hertz, ..load(20.0, Compatibility::VirtualWork) }).unwrap();
     let loaded = LoadedDrive::new(&drive, &load).unwrap();
     let sweep = sweep(&drive, &load, Points::samples(6).unwrap(), &Never).unwrap();
-    // So rough a cam makes the teeth roll on it, and slip at ring and slot.
+    // On a rough cam teeth roll there and slip at ring and slot.
     let (friction, parameters) = (plain(0.2, 0.05), wear_parameters(&mechanism));
     let losses = Losses::of(&drive, &load, &sweep, &friction, &Never).unwrap();
     let wear = Wear::of(&drive, &load, &sweep, &losses, &friction, &parameters, &Never).unwrap();
@@ -992,7 +994,7 @@ fn a_ball_wears_its_groove_by_the_pressure_that_passes_over_its_middle() {
                 let Pressure::Ellipse(ellipse) = pressures.get(contact) else { panic!("a ball touches in an ellipse") };
                 let force_n = *tooth.force_n.get(contact);
                 let half_mm = ellipse.half_width_mm(force_n);
-                // Hertz's semi-ellipse, x = a sin t, by the rule of midpoints.
+                // Hertz's semi-ellipse, x = a sin t, by the midpoint rule.
                 let steps = 200;
                 let step = PI / f64::from(steps);
                 let across = (0..steps).map(|i| (-0.5 * PI + (f64::from(i) + 0.5) * step).cos().powi(2)).sum::<f64>();
@@ -1011,7 +1013,7 @@ fn a_ball_wears_its_groove_by_the_pressure_that_passes_over_its_middle() {
 }
 
 #[test]
-fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_race() {
+fn eccentric_bearing_carries_radial_force_at_race_speed() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
         teeth: 28,
@@ -1031,7 +1033,7 @@ fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_rac
         BearingLoad::of(&mechanism, element, &sweep, &losses, &forces)
     };
     for (element, exponent) in [(RollingElement::Ball, 3.0), (RollingElement::Roller, 10.0 / 3.0)] {
-        // A race at rest against the carrier turns as the wave generator does, at every angle alike.
+        // A race at rest against the carrier turns like the wave generator at every angle.
         let still = of(WaveGeneratorFriction::Rolling { bearing }, element).unwrap();
         assert_near(still.speed_ratio, 1.0, 1e-14, "speed");
         let powers: Vec<_> = forces
@@ -1043,7 +1045,7 @@ fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_rac
         let mean_n = mean_over_period(&powers).powf(1.0 / exponent);
         assert_near(still.mean_load_n, mean_n, 1e-12 * mean_n, "mean load");
         assert!(still.mean_load_n >= 5e3 / 1.2);
-        // One that rubs on the teeth follows them: it turns at another speed (section 10.2).
+        // A race that rubs on the teeth follows them at another speed (section 10.2).
         let rubbing = of(WaveGeneratorFriction::Race { coefficient: 0.05, bearing }, element).unwrap();
         assert!((0.79..0.98).contains(&rubbing.speed_ratio), "{rubbing:?}");
         // A bearing rougher than the teeth does not turn.
@@ -1052,9 +1054,9 @@ fn the_bearing_of_an_eccentric_bears_the_force_across_it_at_the_speed_of_its_rac
     }
 }
 
-/// Its component across the eccentricity makes the torque, wherever slots lie aside and whichever way that is said.
+/// Only its component across the eccentricity counts. Slot offsets come from a modification or from deviations.
 #[test]
-fn across_the_eccentricity_the_radial_force_makes_the_torque_whatever_gaps_there_are_at_the_slots() {
+fn radial_force_balances_torque_with_any_slot_gaps() {
     let drive = drive(&ECCENTRIC);
     let of_slots = |slot_wall_um: f64| Modification { slot_wall_um, ..Modification::default() };
     let of_each = |um: f64| Deviations { slot_wall_um: vec![um; 20], ..Deviations::default() };
@@ -1072,9 +1074,9 @@ fn across_the_eccentricity_the_radial_force_makes_the_torque_whatever_gaps_there
     }
 }
 
-/// Where a tooth enters under load the force across the bearing jumps, and either side of the jump has its own intervals.
+/// Where a tooth enters under load the radial force jumps, and each side of the jump has its own intervals.
 #[test]
-fn a_bearings_mean_load_takes_half_of_each_interval_at_either_end_jumps_too() {
+fn bearing_mean_load_uses_trapezoids_up_to_jumps() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
         teeth: 12,
@@ -1101,7 +1103,7 @@ fn a_bearings_mean_load_takes_half_of_each_interval_at_either_end_jumps_too() {
 }
 
 #[test]
-fn the_capacity_is_the_least_that_any_contact_allows() {
+fn capacity_is_least_over_contacts() {
     for parameters in [PAPER_5_1, PAPER_5_2] {
         let drive = drive(&parameters);
         let capacity = |allowable: PerContact<f64>| {
@@ -1111,7 +1113,7 @@ fn the_capacity_is_the_least_that_any_contact_allows() {
             sweep(&drive, &load, Points::samples(30).unwrap(), &Never).unwrap().torque_capacity.unwrap()
         };
         let allowable = PerContact { wave_generator: 1200.0, ring: 900.0, carrier: 400.0 };
-        // Alone, the others being as good as unlimited.
+        // Each contact alone, with the others unlimited.
         let alone = CONTACTS.map(|contact| {
             let mut limits = everywhere(1e6);
             *limits.get_mut(contact) = *allowable.get(contact);

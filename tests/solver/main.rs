@@ -1,4 +1,4 @@
-//! What is true of drives: against closed forms, independent constructions and a 60-digit calculation.
+//! Tests of the solver against closed forms, independent constructions and a 60-digit calculation.
 #![allow(clippy::float_cmp, clippy::unwrap_used, reason = "tests compare exactly where values are exact")]
 
 mod backing;
@@ -28,6 +28,6 @@ mod tolerances;
 mod true_peaks;
 mod unloaded;
 
-/// Counts, thread by thread, for the tests that ask what a sweep takes.
+/// Counts allocations of each thread, for tests of a sweep's memory.
 #[global_allocator]
 static ALLOCATOR: alloc_counter::AllocCounterSystem = alloc_counter::AllocCounterSystem;

@@ -1,4 +1,4 @@
-//! Outlines of modified parts, against the path of the teeth's centres as the cam's support function gives it: no curve of the solver's.
+//! Outlines of modified parts, against the path of centres from the cam's support function, independent of the solver.
 
 use std::f64::consts::PI;
 
@@ -21,7 +21,7 @@ use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, cases, drive, ellipse
 const NONE: Modification = Modification::NONE;
 const ARCSEC: f64 = PI / 648_000.0;
 
-/// One lobe, and a ring with more teeth than the carrier.
+/// Returns a drive with one lobe and a ring with more teeth than the carrier.
 fn eccentric() -> DriveParameters {
     DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 1.2 },
@@ -33,7 +33,7 @@ fn eccentric() -> DriveParameters {
     }
 }
 
-/// Three lobes.
+/// Returns a drive with three lobes.
 fn three_lobes() -> DriveParameters {
     DriveParameters {
         wave_generator: WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 48.0, amplitude_mm: 1.0 },
@@ -47,7 +47,7 @@ fn three_lobes() -> DriveParameters {
 
 const RELIEF: TipRelief = TipRelief { amount_um: 30.0, start_deg: 20.0, power: 2.0 };
 
-/// Each of the ring's modifications by itself, both ways, and all together.
+/// Returns each modification of the ring alone, in both directions, and all together.
 fn of_the_ring() -> Vec<Modification> {
     let reliefs = [(30.0, 2.0), (-20.0, 1.5), (30.0, 1.0), (10.0, 0.5), (25.0, 3.0)];
     let relief =
@@ -76,7 +76,7 @@ fn unit(angle_rad: f64) -> Vector2<f64> {
     Vector2::new(angle_rad.cos(), angle_rad.sin())
 }
 
-/// A tooth's centre around the cam, by the angle of the cam's normal: `(h + r) n + h' n'`.
+/// Returns a tooth's centre by the cam's normal angle: `(h + r) n + h' n'`.
 fn center(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
     let (support, slope) = match p.wave_generator {
         WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } => {
@@ -97,7 +97,7 @@ fn center(p: &DriveParameters, normal_rad: f64) -> Vector2<f64> {
     (support + p.tooth_radius_mm) * n + slope * Vector2::new(-n.y, n.x)
 }
 
-/// The same in the ring, its radius larger by the shift, and its position ψ.
+/// Returns the shifted centre in the ring's frame, with its position ψ.
 fn in_ring(p: &DriveParameters, normal_rad: f64, shift_mm: f64) -> (Vector2<f64>, f64) {
     let k = p.ring_teeth as f64 / p.wave_generator.lobes() as f64;
     let center = center(p, normal_rad);
@@ -105,7 +105,7 @@ fn in_ring(p: &DriveParameters, normal_rad: f64, shift_mm: f64) -> (Vector2<f64>
     (unit(position / k) * (center.norm() + shift_mm), position)
 }
 
-/// The least distance of a point from the shifted path of one space, and the position that is nearest.
+/// Returns the least distance of a point from the shifted path of one space, and the nearest position.
 fn from_path(p: &DriveParameters, point: Vector2<f64>, shift_mm: f64) -> (f64, f64) {
     let end = PI / p.wave_generator.lobes() as f64;
     let distance = |normal: f64| (point - in_ring(p, normal, shift_mm).0).norm();
@@ -139,7 +139,7 @@ fn edges(outline: &Outline) -> &[Edge] {
     }
 }
 
-/// The ring's edges in one tooth space, from tip to tip.
+/// Returns the ring's edges in one tooth space, from tip to tip.
 fn space(p: &DriveParameters, modification: Modification) -> Vec<Edge> {
     let ring = drawn(p, Subject::Part(Part::Ring), &parts(modification), 1e-4, 0.0).remove(0);
     let edges = edges(&ring.section.holes[0]);
@@ -156,7 +156,7 @@ fn points(edge: &Edge) -> &[Point2<f64>] {
 }
 
 #[test]
-fn every_point_of_a_modified_flank_is_as_far_from_the_moved_path_as_the_modification_says() {
+fn modified_flank_is_offset_from_moved_path() {
     let mut worst: f64 = 0.0;
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         let flank_end_rad = drive(&p).flank_limit().position.from_lobe_rad;
@@ -174,8 +174,8 @@ fn every_point_of_a_modified_flank_is_as_far_from_the_moved_path_as_the_modifica
                         relief.amount_um * share.powf(relief.power)
                     });
                     let off = distance - p.tooth_radius_mm - 1e-3 * (m.ring_equidistant_um + relief_um);
-                    // The position of the nearest point is known to the square root of a distance's digits; a relief of a power below
-                    // one is steep where it starts.
+                    // The nearest position has half of a distance's digits. A relief with a power below one is
+                    // steep at its start.
                     let steep = m.ring_tip_relief.is_some_and(|relief| relief.power < 1.0);
                     let allowed = if m.ring_tip_relief.is_none() {
                         1e-12
@@ -195,7 +195,7 @@ fn every_point_of_a_modified_flank_is_as_far_from_the_moved_path_as_the_modifica
     println!("worst distance from the moved path: {worst:.1e} mm");
 }
 
-/// The farthest that the discs around the shifted path of all spaces reach along the symmetry line of a tooth: its tip.
+/// Returns the tip radius: the farthest reach of discs on the shifted path along a tooth's symmetry line.
 fn swept_tip_mm(p: &DriveParameters, shift_mm: f64, disc_mm: f64) -> f64 {
     let line = unit(PI / p.ring_teeth as f64);
     let end = PI / p.wave_generator.lobes() as f64;
@@ -217,7 +217,7 @@ fn swept_tip_mm(p: &DriveParameters, shift_mm: f64, disc_mm: f64) -> f64 {
 }
 
 #[test]
-fn a_shifted_path_has_its_tip_where_the_swept_discs_end_undercut_or_not() {
+fn shifted_path_tip_matches_swept_discs() {
     for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
         for (path_um, equidistant_um) in [(40.0, 0.0), (-40.0, 0.0), (25.0, -10.0), (-25.0, 10.0)] {
             let m = Modification { ring_path_shift_um: path_um, ring_equidistant_um: equidistant_um, ..NONE };
@@ -228,9 +228,9 @@ fn a_shifted_path_has_its_tip_where_the_swept_discs_end_undercut_or_not() {
     }
 }
 
-/// By the radius at which the swept path's own undercut begins, less and more of it: the flank's end leaves the tip like a square root.
+/// Radii lie just below and above the swept path's own threshold, where the flank's end moves like a square root.
 #[test]
-fn beside_the_threshold_of_undercut_a_shifted_path_ends_where_the_swept_discs_do() {
+fn shifted_path_ends_correctly_near_undercut_threshold() {
     let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
     for off in [-1e-3, -1e-5, 1e-5, 1e-4, 1e-3] {
         let p = DriveParameters { tooth_radius_mm: critical * (1.0 + off), ..PAPER_5_1 };
@@ -242,7 +242,7 @@ fn beside_the_threshold_of_undercut_a_shifted_path_ends_where_the_swept_discs_do
 }
 
 #[test]
-fn what_the_drawing_leaves_between_a_tooth_and_its_partners_is_the_gap_of_the_model() {
+fn drawn_distances_equal_model_gaps() {
     let size_um = 2.0;
     let modifications = [
         Modification { ring_equidistant_um: size_um, ..NONE },
@@ -279,7 +279,7 @@ fn what_the_drawing_leaves_between_a_tooth_and_its_partners_is_the_gap_of_the_mo
                 let at = drive.flank().locus().at(Position::from_lobe(from_lobe, lobes)).unwrap();
                 let gaps = Gaps::new(&drive, &PerContact::default(), m, None);
                 let gap = gaps.at(&Place::default(), &at, &drive.flank().at(&at));
-                // The wall under load: ahead of the tooth where the carrier turns forward, behind it elsewhere.
+                // The wall under load is ahead of the tooth if the carrier turns forward, else behind it.
                 let finger = if sense > 0.0 { slot } else { (slot + fingers - 1) % fingers };
                 let walls = placed_outline(&carrier.section.outer, carrier.placements[finger].rotation_rad);
                 for (name, outline, gap_mm) in [
@@ -316,7 +316,7 @@ fn placed(edges: &[Edge], rotation_rad: f64) -> Vec<Point2<f64>> {
     edges.iter().flat_map(of_edge).map(|point| rotation * point).collect()
 }
 
-/// The least distance of a point from the chords of a closed outline.
+/// Returns the least distance of a point from the chords of a closed outline.
 fn distance(outline: &[Point2<f64>], point: Point2<f64>) -> f64 {
     let of_chord = |(from, to): (&Point2<f64>, &Point2<f64>)| {
         let along = to - from;
@@ -327,7 +327,7 @@ fn distance(outline: &[Point2<f64>], point: Point2<f64>) -> f64 {
 }
 
 #[test]
-fn modified_outlines_close_and_their_curves_start_and_end_along_their_tangents() {
+fn modified_outlines_close_with_matching_tangents() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for m in of_the_ring() {
             let ring = drawn(&p, Subject::Part(Part::Ring), &parts(m), 1e-6, 0.0).remove(0);
@@ -335,7 +335,7 @@ fn modified_outlines_close_and_their_curves_start_and_end_along_their_tangents()
             for (edge, next) in edges.iter().zip(edges.iter().cycle().skip(1)) {
                 assert_eq!(edge.end(), next.start());
                 let Edge::Curve { points, start_tangent, end_tangent, .. } = edge else { continue };
-                // A chord of a thousandth of a radian turns by as much; a steep start of a relief by more.
+                // A chord of a thousandth of a radian turns by as much, at a steep start of a relief by more.
                 let steep = m.ring_tip_relief.is_some_and(|relief| relief.power < 2.0);
                 let [first, second, .., before, last] = &points[..] else { panic!("{points:?}") };
                 for (chord, tangent) in [(second - first, start_tangent), (last - before, end_tangent)] {
@@ -356,7 +356,7 @@ fn modified_outlines_close_and_their_curves_start_and_end_along_their_tangents()
 }
 
 #[test]
-fn turned_flanks_leave_an_arc_at_the_root_and_flanks_turned_together_a_land_at_the_tip() {
+fn turned_flanks_leave_arc_or_land() {
     let turned = |arcsec| space(&PAPER_5_1, Modification { ring_rotation_arcsec: arcsec, ..NONE });
     let [Edge::Curve { points: lower, .. }, Edge::Arc { radius_mm, sweep_rad, .. }, Edge::Curve { points: upper, .. }] =
         &turned(120.0)[..]
@@ -364,7 +364,7 @@ fn turned_flanks_leave_an_arc_at_the_root_and_flanks_turned_together_a_land_at_t
         panic!("{:?}", turned(120.0))
     };
     assert!((radius_mm - 68.0).abs() < 1e-12 && (sweep_rad - 240.0 * ARCSEC).abs() < 1e-15);
-    // Thinned from both sides, the ring's teeth are points, farther out than the regular tip at 66.
+    // Thinned from both sides, the ring's teeth are points outside the regular tip at 66.
     let tip = lower[0].coords.norm();
     assert!(tip > 66.0 && tip < 66.2 && (upper.last().unwrap().coords.norm() - tip).abs() < 1e-12, "{tip}");
     let together = turned(-120.0);
@@ -377,7 +377,7 @@ fn turned_flanks_leave_an_arc_at_the_root_and_flanks_turned_together_a_land_at_t
 }
 
 #[test]
-fn an_equidistant_modification_draws_what_a_clearance_of_its_size_draws() {
+fn equidistant_modification_draws_as_clearance() {
     for p in [PAPER_5_1, PAPER_5_2, eccentric()] {
         for (part, clearance, modification) in [
             (
@@ -408,7 +408,7 @@ fn an_equidistant_modification_draws_what_a_clearance_of_its_size_draws() {
 }
 
 #[test]
-fn a_carrier_beyond_the_tips_of_a_ring_that_is_set_forward_meets_it() {
+fn carrier_beyond_advanced_tips_is_refused() {
     let forward = [
         Modification { ring_equidistant_um: -30.0, ..NONE },
         Modification { ring_path_shift_um: -30.0, ..NONE },
@@ -428,14 +428,14 @@ fn a_carrier_beyond_the_tips_of_a_ring_that_is_set_forward_meets_it() {
         assert!((limit - 65.97).abs() < 1e-9, "{limit} of {modification:?}");
         assert_eq!(of(modification, limit - 1e-6, 0.0), []);
         assert!(!of(modification, limit + 1e-6, 0.0).is_empty());
-        // A clearance sets it back, though no farther than it would be.
+        // A clearance sets it back, but not beyond its nominal place.
         assert_eq!(of(modification, 65.99, 30.0), []);
     }
     assert_eq!(of(NONE, 65.99, 0.0), []);
 }
 
 #[test]
-fn a_rim_begins_outside_the_root_of_the_ring_as_it_is_made() {
+fn rim_starts_outside_root_as_made() {
     let of = |drive: &DriveParameters, modification: Modification, ring_clearance_um: f64| {
         let parts = PartsParameters { ring_outer_radius_mm: Some(60.0), ring_clearance_um, ..parts(modification) };
         let found = parts.violations(Part::Ring, &Draft::new(drive).unwrap());
@@ -447,7 +447,7 @@ fn a_rim_begins_outside_the_root_of_the_ring_as_it_is_made() {
     };
     let set_back = Modification { ring_equidistant_um: 30.0, ..NONE };
     let shifted = Modification { ring_path_shift_um: 40.0, ring_profile_shift_um: -15.0, ..NONE };
-    // a + 2r, and what sets the flank back; a millionth of it is no rim yet.
+    // a + 2r plus all offsets of the flank. A rim must exceed it by a millionth.
     for (modification, clearance_um, root_mm) in [
         (NONE, 0.0, 68.0),
         (NONE, 20.0, 68.02),
@@ -458,15 +458,15 @@ fn a_rim_begins_outside_the_root_of_the_ring_as_it_is_made() {
         let limit = of(&PAPER_5_1, modification, clearance_um);
         assert!((limit - root_mm * (1.0 + 1e-6)).abs() < 1e-9, "{limit}, not {root_mm}");
     }
-    // However wrong other parts are.
+    // Wrong values of other parts do not matter.
     assert_eq!(of(&PAPER_5_1, Modification { slot_wall_um: 2e6, ..set_back }, 0.0), of(&PAPER_5_1, set_back, 0.0));
-    // Where the drive is none, as far as is known.
+    // For an impossible drive, the known values count.
     let impossible = DriveParameters { ring_teeth: 20, ..PAPER_5_1 };
     assert!((of(&impossible, NONE, 20.0) - 68.02 * (1.0 + 1e-6)).abs() < 1e-9);
 }
 
 #[test]
-fn a_drawing_has_no_more_points_than_are_expected_and_one_without_curves_none() {
+fn drawing_keeps_expected_point_count() {
     for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
         for (subject, has_curves) in [
             (Subject::Part(Part::Ring), true),
@@ -501,13 +501,13 @@ fn a_drawing_has_no_more_points_than_are_expected_and_one_without_curves_none() 
 }
 
 #[test]
-fn a_relief_of_nothing_draws_the_conjugate_ring() {
+fn zero_relief_draws_conjugate_ring() {
     let relief = Modification { ring_tip_relief: Some(TipRelief { amount_um: 0.0, ..RELIEF }), ..NONE };
     assert_eq!(space(&PAPER_5_1, relief), space(&PAPER_5_1, NONE));
 }
 
 #[test]
-fn a_space_is_one_curve_where_it_is_smooth_at_its_root_and_where_its_relief_starts_another() {
+fn smooth_space_is_one_curve_and_relief_another() {
     let curves = |start_deg, power| {
         let relief = TipRelief { start_deg, power, ..RELIEF };
         let edges = space(&PAPER_5_1, Modification { ring_tip_relief: Some(relief), ..NONE });
@@ -515,12 +515,12 @@ fn a_space_is_one_curve_where_it_is_smooth_at_its_root_and_where_its_relief_star
         edges.len()
     };
     assert_eq!([curves(20.0, 2.0), curves(20.0, 1.0), curves(20.0, 0.5)], [3, 3, 3]);
-    // A relief from the root on leaves it along the curve by a power above one, and bent otherwise.
+    // A relief from the root continues the curve tangentially with a power above one, else with a bend.
     assert_eq!([curves(0.0, 2.0), curves(0.0, 1.0), curves(0.0, 0.5)], [1, 2, 2]);
 }
 
 #[test]
-fn a_relief_lower_than_the_flank_leaves_the_rim_where_it_is() {
+fn low_relief_leaves_rim_unchanged() {
     let outer = |modification| {
         let ring = drawn(&PAPER_5_1, Subject::Part(Part::Ring), &parts(modification), 1e-2, 0.0).remove(0);
         ring.section.outer
@@ -528,8 +528,8 @@ fn a_relief_lower_than_the_flank_leaves_the_rim_where_it_is() {
     assert_eq!(outer(Modification { ring_tip_relief: Some(RELIEF), ..NONE }), outer(NONE));
 }
 
-/// What the rim is counted from: a ring that ends there is refused, and told how far out it has to end.
-fn told_reach_mm(p: &DriveParameters, parts: &PartsParameters) -> f64 {
+/// Returns the ring's reach, derived from the limit that a refusal of a too small ring reports.
+fn reported_reach_mm(p: &DriveParameters, parts: &PartsParameters) -> f64 {
     let without_rim = PartsParameters { ring_outer_radius_mm: Some(1.0), ..*parts };
     let violations = without_rim.violations(Part::Ring, &Draft::new(p).unwrap());
     let limit = violations.iter().find_map(|violation| match *violation {
@@ -542,9 +542,9 @@ fn told_reach_mm(p: &DriveParameters, parts: &PartsParameters) -> f64 {
 proptest! {
     #![proptest_config(cases(256))]
 
-    /// Within two tolerances of the drawn hole, between whose points the curve may reach farther by one.
+    /// Within two tolerances of the drawn hole: the curve may exceed its points by one tolerance.
     #[test]
-    fn the_rim_begins_where_the_hole_reaches_farthest_out(
+    fn rim_starts_where_hole_reaches_farthest(
         which in 0_usize..5,
         power in prop::sample::select(vec![0.1, 0.5, 1.0, 1.5, 2.0, 3.0, 10.0]),
         (amount, is_set_forward) in (-2.5_f64..0.5, prop::bool::weighted(0.2)),
@@ -573,7 +573,7 @@ proptest! {
         let farthest = |points: &[Point2<f64>]| points.iter().map(|point| point.coords.norm()).fold(0.0, f64::max);
         let drawn_mm = of_hole.iter().map(|edge| farthest(points(edge)).max(edge.start().coords.norm())).fold(0.0, f64::max);
 
-        let reach_mm = told_reach_mm(&p, &parts);
+        let reach_mm = reported_reach_mm(&p, &parts);
         prop_assert!(reach_mm >= drawn_mm * (1.0 - 1e-11), "{reach_mm} told, {drawn_mm} drawn");
         prop_assert!(reach_mm <= drawn_mm + 2.0 * tolerance_mm, "{reach_mm} told, {drawn_mm} drawn");
         let Outline::Circle { radius_mm, .. } = section.outer else { panic!("{:?}", section.outer) };
@@ -588,9 +588,9 @@ proptest! {
     }
 }
 
-/// Near its start a relief of the first power from the root on grows faster than the flank falls, and of a power below one at once.
+/// Near its start a relief of power 1 or less grows faster than the flank falls.
 #[test]
-fn a_relief_that_leaves_the_root_outward_takes_from_the_rim() {
+fn outward_relief_at_root_reduces_rim() {
     for (amount_um, power, outer_mm) in [(500.0, 0.1, 68.2), (1000.0, 1.0, 68.02)] {
         let relief = TipRelief { amount_um, start_deg: 0.0, power };
         let parts = PartsParameters {
@@ -606,7 +606,7 @@ fn a_relief_that_leaves_the_root_outward_takes_from_the_rim() {
 }
 
 #[test]
-fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
+fn excessive_modification_is_refused_at_its_number() {
     let refused = |p: &DriveParameters, part, modification| {
         let parameters = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
         match Drawing::new(&Draft::new(p).unwrap(), Subject::Part(part), &parts(modification), &parameters) {
@@ -622,7 +622,7 @@ fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
             Modification { ring_equidistant_um: -5000.0, ..NONE },
             nothing(Modified::RingEquidistant, -5000.0, Some(-5000.0)),
         ),
-        // 26 teeth stand 24 923 arc seconds from the middle of a space to that of a tooth.
+        // With 26 teeth, the middle of a space is 24 923 arc seconds from that of a tooth.
         (
             Part::Ring,
             Modification { ring_rotation_arcsec: 25_000.0, ..NONE },
@@ -657,7 +657,7 @@ fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
     let parameter = Parameter::Modification(Modified::SlotWall);
     let out_of_range = Violation::OutOfRange { parameter, value: 2e6, limit: 1e6 };
     assert!(refused(&p, Part::Carrier, far).contains(&out_of_range));
-    // A flank set so far inside that the bore takes it whole.
+    // The flank is set so far inside that the bore removes it.
     let root_mm = Drive::new(&PAPER_5_2_BORED).unwrap().root_radius_mm();
     let least_um = 1e3 * (52.8227 - root_mm);
     let found = refused(&PAPER_5_2_BORED, Part::Ring, Modification { ring_equidistant_um: least_um - 1.0, ..NONE });
@@ -667,10 +667,10 @@ fn a_modification_that_leaves_no_outline_is_refused_with_the_number_at_fault() {
     );
 }
 
-/// Nearly round and bored, the flank ends where its height hardly changes; turned a little, it goes on to the valley, where a relief of the 52nd power has long
-/// left the ring.
+/// The cam is nearly round and the tip bored. A turned flank extends to the valley, where a relief of the 52nd
+/// power is far outside the ring.
 #[test]
-fn a_relief_that_rises_out_of_its_space_is_refused() {
+fn relief_rising_out_of_its_space_is_refused() {
     let p = DriveParameters {
         wave_generator: ellipse(34.253_525_011_805_64, 34.246_474_988_194_36),
         teeth: 28,
@@ -695,10 +695,9 @@ fn a_relief_that_rises_out_of_its_space_is_refused() {
     assert!(gentle.bodies(&Never).is_ok());
 }
 
-/// A relief that is set forward and grows with some power bends the flank once more, and once more again, where it overtakes what the path bends. The tangent at one end of such a
-/// stretch may lie along its chord, as if there was nothing between.
+/// A relief adds inflections where its curvature exceeds the path's. A tangent at one end may lie along the chord.
 #[test]
-fn a_chord_on_which_a_relieved_flank_bends_more_than_once_is_true_to_the_tolerance() {
+fn chord_with_several_inflections_keeps_tolerance() {
     let p = PAPER_5_1;
     let half_rad = 0.5 * PI;
     let k = p.ring_teeth as f64 / 2.0;
@@ -728,7 +727,7 @@ fn a_chord_on_which_a_relieved_flank_bends_more_than_once_is_true_to_the_toleran
     }
 }
 
-/// Bézier's polygons of all curves.
+/// Returns the Bézier polygons of all curves.
 fn polynomials(edges: &[Edge]) -> Vec<Vec<Point2<f64>>> {
     let of_edge = |edge: &Edge| match edge {
         Edge::Curve { polynomials, .. } => polynomials.clone(),
@@ -737,7 +736,7 @@ fn polynomials(edges: &[Edge]) -> Vec<Vec<Point2<f64>>> {
     edges.iter().flat_map(of_edge).collect()
 }
 
-/// Points of a polynomial by Bernstein's own sum, both ends included.
+/// Samples a polynomial with Bernstein's sum, including both ends.
 fn along(polygon: &[Point2<f64>]) -> impl Iterator<Item = Vector2<f64>> {
     let degree = polygon.len() - 1;
     (0..=60).map(move |i| {
@@ -753,7 +752,7 @@ fn along(polygon: &[Point2<f64>]) -> impl Iterator<Item = Vector2<f64>> {
 }
 
 #[test]
-fn solids_have_polynomials_that_are_everywhere_within_a_hundredth_of_the_chord_tolerance() {
+fn solid_polynomials_keep_hundredth_of_chord_tolerance() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for tolerance_mm in [1e-2, 1e-3, 1e-5] {
             let near_mm = 0.01 * tolerance_mm;
@@ -770,7 +769,7 @@ fn solids_have_polynomials_that_are_everywhere_within_a_hundredth_of_the_chord_t
             if let WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } = p.wave_generator {
                 let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts(NONE), tolerance_mm, 0.0).remove(0);
                 for point in polynomials(self::edges(&cam.section.outer)).iter().flat_map(|polygon| along(polygon)) {
-                    // To the first order, the distance from the ellipse.
+                    // Distance from the ellipse to first order.
                     let slope = 2.0 * (point.x / (a * a)).hypot(point.y / (b * b));
                     let off_mm = ((point.x / a).powi(2) + (point.y / b).powi(2) - 1.0).abs() / slope;
                     assert!(off_mm < 1.1 * near_mm, "{off_mm} of {near_mm}");
@@ -781,7 +780,7 @@ fn solids_have_polynomials_that_are_everywhere_within_a_hundredth_of_the_chord_t
 }
 
 #[test]
-fn polynomials_follow_each_other_along_one_tangent_and_end_with_their_curve() {
+fn polynomials_join_tangentially_and_end_with_curve() {
     for p in [PAPER_5_1, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for m in of_the_ring().into_iter().chain([NONE]) {
             for part in [Part::Ring, Part::WaveGenerator] {

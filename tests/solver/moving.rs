@@ -1,4 +1,4 @@
-//! The wave generator that moves on under its teeth as it winds up: against the path of the teeth's centres itself, and against a plain search for the rotation.
+//! The wave generator moves under its teeth as it winds up. Tests compare with the path of centres and a plain search.
 
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::gaps::TipRelief;
@@ -36,15 +36,15 @@ fn at(drive: &Drive, position_rad: f64) -> toothwave_solver::cam::ToothCenter {
     drive.flank().locus().at(folded).unwrap()
 }
 
-/// `d tan γ`, of which the sign turns with the side of the lobe.
+/// Returns `d tan γ`, with the sign of the side of the lobe.
 fn slope_mm(drive: &Drive, position_rad: f64) -> f64 {
     let tooth = at(drive, position_rad);
     position_rad.signum() * tooth.center_radius_mm * tooth.tan_pressure_angle
 }
 
-/// Halving the rotation leaves an eighth of what the third order misses.
+/// Half the rotation leaves an eighth of the third-order remainder.
 #[test]
-fn a_tooth_is_moved_as_far_as_the_path_of_its_centre_says_to_second_order() {
+fn tooth_moves_along_centre_path_to_second_order() {
     for parameters in [PAPER_5_1, PAPER_5_2, ECCENTRIC, THREE_LOBES] {
         let drive = drive(&parameters);
         let case = LoadCase::new(&moving(1.0)).unwrap();
@@ -65,7 +65,7 @@ fn a_tooth_is_moved_as_far_as_the_path_of_its_centre_says_to_second_order() {
     }
 }
 
-/// The teeth of one input angle, and what they carry.
+/// Returns the teeth of one input angle with their forces.
 fn shared(loaded: &LoadedDrive<'_>, sample: u64) -> (Vec<ToothState>, WindUp, Vec<f64>) {
     let samples = Samples::new(7).unwrap();
     let placed = loaded.mesh().placed_at(sample, samples);
@@ -75,9 +75,9 @@ fn shared(loaded: &LoadedDrive<'_>, sample: u64) -> (Vec<ToothState>, WindUp, Ve
     (teeth, wind_up, forces)
 }
 
-/// Arms and their decline by differences of the path of centres, the rotation by halving.
+/// Arms and their decline are differences on the path of centres. The rotation is found by bisection.
 #[test]
-fn loads_are_those_at_which_the_moved_arms_make_the_torque() {
+fn loads_balance_torque_with_moved_arms() {
     let fixed = ContactLaw::Fixed(PerContact { wave_generator: 4e5, ring: 3e5, carrier: 5e5 });
     let gaps = [PerContact::default(), PerContact { ring: 10.0, ..PerContact::default() }, everywhere(4.0)];
     for (parameters, torque_nm) in
@@ -93,7 +93,7 @@ fn loads_are_those_at_which_the_moved_arms_make_the_torque() {
                     let psi = tooth.center.position.from_lobe_rad;
                     let cos = 1.0 / tooth.center.tan_pressure_angle.hypot(1.0);
                     let decline = (slope_mm(&drive, psi + 1e-5) - slope_mm(&drive, psi - 1e-5)) / 2e-5;
-                    // The wave generator needs this rotation to move the tooth aside in its slot, to its place on the flank.
+                    // This rotation moves the tooth across its slot to its place on the flank.
                     let lost_rad = drive.teeth_per_wave() * 1e-3 * clearance_um.carrier / tooth.center.center_radius_mm;
                     let turned_rad = turned_rad - lost_rad;
                     let way_mm = cos * (slope_mm(&drive, psi) * turned_rad - 0.5 * decline * turned_rad * turned_rad);
@@ -121,7 +121,7 @@ fn loads_are_those_at_which_the_moved_arms_make_the_torque() {
                 );
                 for (tooth, force_n) in teeth.iter().zip(&forces) {
                     let expected_n = turned(tooth, high).0;
-                    // A light load across wide gaps has lost some digits to the differences.
+                    // A light load across wide gaps loses some digits in differences.
                     assert!((force_n - expected_n).abs() < 1e-4 * peak_n, "{name}: {force_n} N, {expected_n} N");
                 }
                 // The torque's derivative is the stiffness.
@@ -136,7 +136,7 @@ fn loads_are_those_at_which_the_moved_arms_make_the_torque() {
 }
 
 #[test]
-fn a_light_load_without_gaps_moves_nothing() {
+fn light_load_without_gaps_moves_nothing() {
     for parameters in [PAPER_5_1, PAPER_5_2, ECCENTRIC, THREE_LOBES] {
         let still = swept(&parameters, &LoadParameters { wave_generator_moves: false, ..moving(1e-10) }, 12);
         let moved = swept(&parameters, &moving(1e-10), 12);
@@ -148,9 +148,9 @@ fn a_light_load_without_gaps_moves_nothing() {
     }
 }
 
-/// A tooth that the wave generator has moved past is pushed on by what is left of its way, the other way round, until that is nothing: no load jumps.
+/// The wave generator pushes a passed tooth along its remaining way, so no load jumps.
 #[test]
-fn a_tooth_that_has_been_passed_is_let_go_little_by_little() {
+fn passed_tooth_is_released_gradually() {
     let drive = drive(&PAPER_5_1);
     let case = LoadCase::new(&moving(20.0)).unwrap();
     let loaded = LoadedDrive::new(&drive, &case).unwrap();
@@ -170,9 +170,9 @@ fn a_tooth_that_has_been_passed_is_let_go_little_by_little() {
     assert!(on_lobe.0 < 0.01 * peak_n, "{} of {peak_n}", on_lobe.0);
 }
 
-/// In the valley a tooth has no arm, but the wave generator that moves on lifts it there too: by half its curvature times the square of what it turns.
+/// Without an arm, the wave generator lifts the tooth by half its curvature times the rotation squared.
 #[test]
-fn a_tooth_in_the_valley_closes_its_gap_when_the_wave_generator_has_moved_on() {
+fn tooth_in_valley_closes_gap_after_rotation() {
     for (parameters, lobes) in [(PAPER_5_1, 2), (ECCENTRIC, 1), (THREE_LOBES, 3)] {
         let drive = drive(&parameters);
         let clearance_um = PerContact { ring: 10.0, ..PerContact::default() };
@@ -188,7 +188,7 @@ fn a_tooth_in_the_valley_closes_its_gap_when_the_wave_generator_has_moved_on() {
         let further = Rotation { closing_rad, excess_rad: 0.5 * closing_rad };
         assert!(tooth.spring.force_n(&further).unwrap() > 0.0);
         assert!(tooth.spring.turned_static_arm_mm(&further) > 0.0);
-        // Beside one that has an arm it carries its part.
+        // It carries its share beside a tooth with an arm.
         let lifted = loaded.tooth(Position::from_lobe(1.0 / f64::from(lobes), lobes)).unwrap();
         let both = [lifted, tooth];
         let springs = Springs::new(&both, f64::from(lobes));
@@ -198,10 +198,9 @@ fn a_tooth_in_the_valley_closes_its_gap_when_the_wave_generator_has_moved_on() {
     }
 }
 
-/// The teeth's path itself: the ring's turn against the slot moves the place on it, the wave generator's the place under it. A law that weighed the gap of a slot
-/// where the tooth stood closed it at once in the valley.
+/// The ring's rotation against the slot moves the place on the teeth's path, the wave generator's the place under it.
 #[test]
-fn gaps_at_the_slots_are_closed_at_the_rotation_that_rigid_bodies_need_in_the_valley_too() {
+fn slot_gaps_close_at_rigid_body_rotation() {
     for (parameters, carrier_um) in
         [(PAPER_5_1, 20.0), (PAPER_5_1, 500.0), (PAPER_5_2, 10.0), (ECCENTRIC, 100.0), (THREE_LOBES, 50.0)]
     {
@@ -214,7 +213,7 @@ fn gaps_at_the_slots_are_closed_at_the_rotation_that_rigid_bodies_need_in_the_va
         for share in [0.3, 0.6, 0.9, 0.97] {
             let position_rad = share * drive.flank_limit().position.from_lobe_rad;
             let tooth = loaded.tooth(Position::from_lobe(position_rad, drive.lobes())).unwrap();
-            // There on the flank the tooth lies at its wall, so far aside in a slot that stands k times as far before it.
+            // On the flank the tooth is at its wall, offset in a slot that is k times as far ahead.
             let on_flank_mm = at(&drive, position_rad).center_radius_mm;
             let aside_rad = (1e-3 * carrier_um / on_flank_mm).asin();
             let slot_rad = position_rad + k * aside_rad;
@@ -227,9 +226,9 @@ fn gaps_at_the_slots_are_closed_at_the_rotation_that_rigid_bodies_need_in_the_va
     }
 }
 
-/// From where the slot is closed on the wave generator lifts the tooth by the gap that is left at the ring, under an arm that is no other for the slot's sake.
+/// Once the slot is closed, the wave generator lifts the tooth by the remaining gap at the ring, with the same arm.
 #[test]
-fn a_tooth_whose_slot_is_turned_closes_its_other_gaps_by_the_way_that_is_left() {
+fn tooth_of_turned_slot_closes_remaining_gaps() {
     let drive = drive(&PAPER_5_1);
     let clearance_um = PerContact { ring: 300.0, ..PerContact::default() };
     let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(20.0) }).unwrap();
@@ -247,7 +246,7 @@ fn a_tooth_whose_slot_is_turned_closes_its_other_gaps_by_the_way_that_is_left() 
             let decline_mm =
                 cos * (slope_mm(&drive, position_rad + 1e-5) - slope_mm(&drive, position_rad - 1e-5)) / 2e-5;
             let slot_rad = drive.teeth_per_wave() * (arcsec / 3600.0).to_radians();
-            // An arm that grows begins where the valley passes.
+            // A growing arm starts when the valley passes.
             let from_rad = if decline_mm < 0.0 { slot_rad.max(arm_mm / decline_mm) } else { slot_rad };
             let way_mm = |turned_rad: f64| arm_mm * turned_rad - 0.5 * decline_mm * turned_rad * turned_rad;
             let closing_rad = tooth.spring.closing_rad;
@@ -260,9 +259,9 @@ fn a_tooth_whose_slot_is_turned_closes_its_other_gaps_by_the_way_that_is_left() 
     }
 }
 
-/// Positions count from where most items leave their teeth, whichever way a single one is off.
+/// Positions count from those of most items, for either direction of the deviation.
 #[test]
-fn what_a_single_item_is_turned_by_changes_nothing_at_the_teeth_of_others() {
+fn turned_item_does_not_affect_other_teeth() {
     let drive = drive(&PAPER_5_1);
     let case = LoadCase::new(&moving(20.0)).unwrap();
     let shape = ToothContact::of(&drive, case.parameters().carrier);
@@ -281,7 +280,7 @@ fn what_a_single_item_is_turned_by_changes_nothing_at_the_teeth_of_others() {
 }
 
 #[test]
-fn what_gaps_at_the_slots_alone_cost_in_transmission_error_is_what_the_teeths_radii_differ_by() {
+fn slot_gap_transmission_error_follows_tooth_radii() {
     let drive = drive(&PAPER_5_1);
     let clearance_um = PerContact { carrier: 20.0, ..PerContact::default() };
     let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(1e-6) }).unwrap();
@@ -294,9 +293,9 @@ fn what_gaps_at_the_slots_alone_cost_in_transmission_error_is_what_the_teeths_ra
     assert!(sweep.torque_balance_residual < 1e-12, "{:e}", sweep.torque_balance_residual);
 }
 
-/// Teeth come to the flank as many degrees earlier as they lie aside. By a law that knew nothing of it the largest force grew by 16 % with 50 µm.
+/// The gaps only shift the angle at which teeth reach the flank.
 #[test]
-fn gaps_at_all_slots_alike_change_the_largest_force_at_a_bored_tip_by_no_more_than_radii_differ() {
+fn equal_slot_gaps_hardly_change_bored_tip_peak() {
     for parameters in [PAPER_5_2, PAPER_5_2_BORED] {
         let peak_n = |carrier_um: f64| {
             let clearance_um = PerContact { carrier: carrier_um, ..PerContact::default() };
@@ -314,9 +313,9 @@ fn gaps_at_all_slots_alike_change_the_largest_force_at_a_bored_tip_by_no_more_th
     }
 }
 
-/// In the valley the slot that is turned least is ahead of the others: it was pressed before its gap was closed, from behind.
+/// In the valley the slot that is turned least leads the others.
 #[test]
-fn no_tooth_is_pressed_before_its_gap_is_closed_however_far_its_slot_is_ahead_of_the_others() {
+fn no_tooth_is_pressed_before_its_gap_closes() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 30.8, eccentricity_mm: 0.8 },
         teeth: 18,
@@ -345,9 +344,9 @@ fn no_tooth_is_pressed_before_its_gap_is_closed_however_far_its_slot_is_ahead_of
     }
 }
 
-/// A search for the rotation under so light a load once had no end.
+/// The search for the rotation must end under a tiny load across wide gaps.
 #[test]
-fn a_light_load_across_wide_gaps_at_the_slots_is_borne_by_those_that_close_them_first() {
+fn first_closing_slots_carry_light_load() {
     let drive = drive(&PAPER_5_1);
     let clearance_um = PerContact { carrier: 1000.0, ..PerContact::default() };
     let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(1e-9) }).unwrap();
@@ -361,7 +360,7 @@ fn a_light_load_across_wide_gaps_at_the_slots_is_borne_by_those_that_close_them_
 }
 
 #[test]
-fn gaps_wider_than_the_wave_generator_lifts_teeth_are_never_closed_and_that_is_said() {
+fn gaps_wider_than_lift_give_an_error() {
     let drive = drive(&PAPER_5_2);
     let allowable_stress_mpa = Some(everywhere(1500.0));
     for clearance_um in [everywhere(0.0), PerContact { ring: 1000.0, ..PerContact::default() }] {
@@ -379,7 +378,7 @@ fn gaps_wider_than_the_wave_generator_lifts_teeth_are_never_closed_and_that_is_s
 }
 
 #[test]
-fn under_the_torque_capacity_the_largest_stress_is_the_allowable_one() {
+fn allowable_stress_is_reached_under_torque_capacity() {
     for parameters in [PAPER_5_1, PAPER_5_2, ECCENTRIC] {
         for ring_um in [0.0, 10.0] {
             let clearance_um = PerContact { ring: ring_um, ..PerContact::default() };
@@ -394,7 +393,7 @@ fn under_the_torque_capacity_the_largest_stress_is_the_allowable_one() {
     }
 }
 
-/// Teeth so soft that the wave generator turns far beyond the first of them.
+/// Material so soft that the wave generator turns far past the first tooth.
 const PLASTIC: Materials = {
     let soft = Material { youngs_modulus_gpa: 3.5, poissons_ratio: 0.4 };
     Materials { wave_generator: soft, teeth: soft, ring: soft, carrier: soft }
@@ -410,7 +409,8 @@ const FINE_ECCENTRIC: DriveParameters = DriveParameters {
     tip_radius_mm: None,
 };
 
-/// The rotation and the torque of the first maximum beyond which no tooth has a gap left to close, in small steps and then by thirds; none within a quarter of a lobe.
+/// Returns rotation and torque of the first maximum after all gaps are closed, within a quarter of a lobe.
+/// It searches in small steps, then by thirds.
 fn first_maximum(teeth: &[ToothState], lobes: u32) -> Option<(f64, f64)> {
     const STEPS: u32 = 1000;
     let springs = Springs::new(teeth, f64::from(lobes));
@@ -436,10 +436,10 @@ fn first_maximum(teeth: &[ToothState], lobes: u32) -> Option<(f64, f64)> {
     Some((low, torque_nmm(low)))
 }
 
-/// Soft drives with few teeth in mesh and with many, those of eccentrics with pointed tips.
+/// Returns soft drives with few and many teeth in mesh, and eccentric ones with pointed tips.
 fn soft_drives() -> Vec<(DriveParameters, f64)> {
     let mut drives = vec![(FINE_ECCENTRIC, 0.0), (PAPER_5_2, 0.0), (PAPER_5_2, 30.0), (PAPER_5_2_BORED, 10.0)];
-    // The same sequence each time.
+    // A reproducible sequence.
     let mut state = 7_u64;
     let mut random = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -468,7 +468,7 @@ fn soft_drives() -> Vec<(DriveParameters, f64)> {
     drives
 }
 
-/// Calls with the teeth of some input angles of soft drives, and the maximum of their torque.
+/// Calls a function with teeth of some input angles of soft drives, and their maximum torque.
 fn at_soft_teeth(mut look: impl FnMut(&LoadedDrive<'_>, &[ToothState], (f64, f64))) {
     let mut looked = 0;
     for (parameters, ring_um) in soft_drives() {
@@ -491,9 +491,9 @@ fn at_soft_teeth(mut look: impl FnMut(&LoadedDrive<'_>, &[ToothState], (f64, f64
     assert!(looked > 30, "{looked}");
 }
 
-/// A search in steps of two once passed over the maximum, and found a rotation beyond it, or none below.
+/// The search must not step over the maximum.
 #[test]
-fn every_torque_below_the_first_maximum_is_carried_before_it_and_none_above() {
+fn every_torque_below_first_maximum_is_carried() {
     at_soft_teeth(|loaded, teeth, (turned_rad, most_nmm)| {
         let springs = Springs::new(teeth, f64::from(loaded.drive().lobes()));
         for share in [1e-9, 0.1, 0.5, 0.9, 0.98, 0.995, 0.999_999] {
@@ -510,7 +510,7 @@ fn every_torque_below_the_first_maximum_is_carried_before_it_and_none_above() {
 }
 
 #[test]
-fn a_higher_allowable_stress_never_makes_less_of_the_capacity_and_none_makes_more_than_teeth_carry() {
+fn capacity_never_falls_with_higher_allowable_stress() {
     at_soft_teeth(|loaded, teeth, (_, most_nmm)| {
         let mut before_nmm = 0.0;
         for exponent in 0..40 {
@@ -522,7 +522,7 @@ fn a_higher_allowable_stress_never_makes_less_of_the_capacity_and_none_makes_mor
             assert!(limit.input_torque_nmm >= before_nmm * (1.0 - 1e-9), "{stress_mpa} MPa: {limit:?} {before_nmm}");
             assert!(limit.input_torque_nmm <= most_nmm * (1.0 + 1e-9), "{stress_mpa} MPa: {limit:?} {most_nmm}");
             if limit.turns_past_teeth {
-                // Where the maximum is a corner, as a tooth is let go, its torque is off in proportion to its place.
+                // If a tooth is released at the maximum, the torque's error is proportional to the place's.
                 assert!((limit.input_torque_nmm / most_nmm - 1.0).abs() < 1e-8, "{limit:?} {most_nmm}");
             }
             before_nmm = limit.input_torque_nmm;
@@ -531,7 +531,7 @@ fn a_higher_allowable_stress_never_makes_less_of_the_capacity_and_none_makes_mor
 }
 
 #[test]
-fn a_capacity_that_no_contact_limits_says_that_the_wave_generator_turns_past_its_teeth() {
+fn unlimited_capacity_reports_wave_generator_passing_teeth() {
     let capacity = |parameters: &DriveParameters, ring_um: f64, stress_mpa: f64| {
         let clearance_um = PerContact { ring: ring_um, ..PerContact::default() };
         let allowable_stress_mpa = Some(everywhere(stress_mpa));
@@ -550,13 +550,13 @@ fn a_capacity_that_no_contact_limits_says_that_the_wave_generator_turns_past_its
         assert!(torques_nm.is_sorted(), "{torques_nm:?}");
         assert_eq!(capacities.map(|capacity| capacity.turns_past_teeth), [false, false, true], "{torques_nm:?}");
     }
-    // A load that is answered without an allowable stress was refused with this one, which no contact reaches.
+    // An allowable stress that no contact reaches must not cause a refusal.
     assert!(capacity(&PAPER_5_2_BORED, 10.0, 300.0).turns_past_teeth);
 }
 
-/// Relief along all of the flank leaves the tooth nearest to the lobe to close first: the wave generator moves past it under next to nothing, and on to the others.
+/// With relief along the whole flank, the tooth nearest to the lobe closes first and carries next to nothing.
 #[test]
-fn the_wave_generator_moves_past_a_tooth_by_the_lobe_to_those_that_still_have_gaps() {
+fn wave_generator_passes_lobe_tooth_to_reach_others() {
     let ring_tip_relief = Some(TipRelief { amount_um: 200.0, start_deg: 0.0, power: 2.0 });
     let modification = Modification { ring_tip_relief, ..Modification::default() };
     let drive = drive(&PAPER_5_1);
@@ -571,9 +571,9 @@ fn the_wave_generator_moves_past_a_tooth_by_the_lobe_to_those_that_still_have_ga
     assert!((springs.torque_nmm(&found.rotation).unwrap().value / 1e3 - 1.0).abs() < 1e-12);
 }
 
-/// The capacity is the higher one, though the wave generator moves on to where the relieved tooth closes its gap.
+/// The wave generator still moves on to where the relieved tooth closes its gap.
 #[test]
-fn of_two_maxima_the_capacity_is_the_higher_one_also_where_that_comes_first() {
+fn capacity_is_higher_of_two_maxima() {
     let ring_tip_relief = Some(TipRelief { amount_um: 2000.0, start_deg: 12.0, power: 1.0 });
     let modification = Modification { ring_tip_relief, ..Modification::default() };
     let drive = drive(&PAPER_5_1);
@@ -595,7 +595,7 @@ fn of_two_maxima_the_capacity_is_the_higher_one_also_where_that_comes_first() {
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_finds_what_no_dense_one_exceeds() {
+fn no_dense_sweep_exceeds_tolerance_sweep() {
     for (parameters, torque_nm) in [(PAPER_5_1, 20.0), (PAPER_5_2, 3.0), (THREE_LOBES, 30.0)] {
         for ring_um in [0.0, 10.0] {
             let clearance_um = PerContact { ring: ring_um, ..PerContact::default() };
@@ -616,9 +616,9 @@ fn a_sweep_to_a_tolerance_finds_what_no_dense_one_exceeds() {
     }
 }
 
-/// Without the tooth: the wave generator has moved on so far already that it presses the tooth in the valley.
+/// Before the tooth enters the regular tip, the wave generator has moved so far that it presses the valley tooth.
 #[test]
-fn the_capacity_just_before_a_tooth_enters_a_regular_tip_is_seen_by_a_sweep_to_a_tolerance() {
+fn tolerance_sweep_sees_capacity_before_tooth_entry() {
     let ellipse = WaveGenerator::Ellipse { semi_major_mm: 32.9442, semi_minor_mm: 31.7933 };
     let parameters = DriveParameters {
         wave_generator: ellipse,
@@ -651,7 +651,7 @@ fn the_capacity_just_before_a_tooth_enters_a_regular_tip_is_seen_by_a_sweep_to_a
 }
 
 #[test]
-fn projection_takes_no_wave_generator_that_moves() {
+fn projection_rejects_moving_wave_generator() {
     let refused = LoadCase::new(&LoadParameters { wave_generator_moves: true, ..load(3.0, Projection) });
     assert_eq!(refused, Err(vec![Violation::NeedsVirtualWork { parameter: Parameter::WaveGeneratorMoves }]));
 }

@@ -1,4 +1,4 @@
-//! Against constructions that share no formula with the solver: dense systems of equations, and swept circles.
+//! Independent constructions: dense systems of equations and swept circles.
 
 use std::f64::consts::PI;
 
@@ -13,10 +13,10 @@ use crate::drives::{
     PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, any_drive, any_swept_drive, cases, drive, load, semi_axes_mm,
 };
 
-/// The directions of the three forces on a tooth, in its slot's frame: x outward, y in the sense of the input.
+/// Returns the directions of the three forces on a tooth in its slot's frame: x outward, y in the sense of the input.
 ///
-/// Turning +, the wave generator pushes outward and forward. For s = +1 the ring pushes inward and forward and the slot holds
-/// the tooth back; for s = -1 the ring pushes backward and the slot forward.
+/// In the positive sense, the wave generator pushes outward and forward. For s = +1 the ring pushes inward and forward
+/// and the slot holds the tooth back. For s = -1 the ring pushes backward and the slot forward.
 fn directions(drive: &Drive, tooth: &ToothState) -> PerContact<Vector2<f64>> {
     let (cam, ring) = (tooth.center.tan_pressure_angle.atan(), tooth.flank.tan_pressure_angle.atan());
     PerContact {
@@ -30,7 +30,7 @@ fn lever_mm(tooth: &ToothState) -> f64 {
     tooth.center.center_radius_mm * tooth.center.tan_pressure_angle.atan().sin()
 }
 
-/// The paper's 3n equations as printed: equilibrium [1], torque [2], compatibility of neighbours [3]-[7].
+/// Solves the paper's 3n equations as printed: equilibrium [1], torque [2], compatibility of neighbours [3]-[7].
 fn forces_by_projection(
     drive: &Drive,
     teeth: &[ToothState],
@@ -66,7 +66,7 @@ fn forces_by_projection(
         }
     }
     right[2 * n] = torque_nmm;
-    // Rows of like size, or the elimination loses digits that the equations have.
+    // Rows of similar size keep the elimination accurate.
     for mut row in matrix.row_iter_mut().skip(2 * n + 1) {
         let largest = row.amax();
         if largest > 0.0 {
@@ -83,7 +83,7 @@ fn forces_by_projection(
         .collect()
 }
 
-/// Teeth whose centres are free to move in two directions against three springs each, and one rotation for all.
+/// Solves for teeth with free centres against three springs each, and one common rotation.
 fn forces_by_springs(
     drive: &Drive,
     teeth: &[ToothState],
@@ -129,7 +129,7 @@ fn forces_by_springs(
         .collect()
 }
 
-/// The largest difference between the closed form and a dense solve over a few input angles, over the largest force.
+/// Returns the largest difference between the closed form and a dense solve at some angles, over the largest force.
 pub(crate) fn worst_difference(
     parameters: &DriveParameters,
     compatibility: Compatibility,
@@ -168,7 +168,7 @@ pub(crate) const EQUAL: PerContact<f64> = PerContact { wave_generator: 1e6, ring
 pub(crate) const UNEQUAL: PerContact<f64> = PerContact { wave_generator: 1.3e6, ring: 0.7e6, carrier: 0.9e6 };
 
 #[test]
-fn projection_is_the_papers_3n_equations() {
+fn projection_matches_the_papers_3n_equations() {
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
         for stiffness in [EQUAL, UNEQUAL] {
             let worst = worst_difference(&parameters, Projection, stiffness);
@@ -178,7 +178,7 @@ fn projection_is_the_papers_3n_equations() {
 }
 
 #[test]
-fn virtual_work_is_a_tooth_free_to_move_against_three_springs() {
+fn virtual_work_is_free_tooth_on_three_springs() {
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
         for stiffness in [EQUAL, UNEQUAL] {
             let worst = worst_difference(&parameters, VirtualWork, stiffness);
@@ -191,14 +191,14 @@ proptest! {
     #![proptest_config(cases(128))]
 
     #[test]
-    fn the_closed_form_agrees_with_dense_solves_on_any_drive(parameters in any_swept_drive()) {
-        // The elimination's own error grows with the number of equations and with their scale.
+    fn closed_form_matches_dense_solves(parameters in any_swept_drive()) {
+        // The elimination's own error grows with the number and the scale of the equations.
         prop_assert!(worst_difference(&parameters, Projection, EQUAL) < 1e-9);
         prop_assert!(worst_difference(&parameters, VirtualWork, UNEQUAL) < 1e-9);
     }
 
     #[test]
-    fn the_ring_is_the_boundary_of_the_circles_swept_along_the_path(parameters in any_drive(), share in 0.02_f64..0.98) {
+    fn ring_is_boundary_of_swept_circles(parameters in any_drive(), share in 0.02_f64..0.98) {
         let drive = drive(&parameters);
         let flank = drive.flank();
         let end_rad = drive.flank_limit().position.from_lobe_rad;
@@ -211,8 +211,8 @@ proptest! {
     }
 }
 
-/// How far from the axis any circle on the path reaches in the direction `angle_rad` of the ring's frame, by a scan over the
-/// whole tooth space and its neighbours, refined around its maximum.
+/// Returns the farthest reach of any circle on the path in the direction `angle_rad` of the ring's frame.
+/// It scans the tooth space and its neighbours and refines the maximum.
 fn farthest_swept_mm(drive: &Drive, angle_rad: f64) -> f64 {
     const SCAN: u32 = 4000;
     let p = drive.parameters();

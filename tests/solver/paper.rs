@@ -1,4 +1,4 @@
-//! The paper's cases, as separate calculations found them (docs/theory.md section 6).
+//! The paper's cases against separate calculations (docs/explanation/theory.md section 6).
 
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::mesh::{Mesh, TeethInMesh};
@@ -6,7 +6,7 @@ use toothwave_solver::ring::FlankEnd;
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, load, swept};
 
-/// Six peaks to the three decimals that are known.
+/// Asserts six peaks to three decimals.
 fn assert_peaks(compatibility: toothwave_solver::Compatibility, expected: [f64; 6]) {
     let peaks = swept(&PAPER_5_1, &load(20.0, compatibility), 50).peaks;
     let found = [
@@ -23,24 +23,24 @@ fn assert_peaks(compatibility: toothwave_solver::Compatibility, expected: [f64; 
 }
 
 #[test]
-fn case_5_1_has_the_known_peaks_by_projection() {
+fn case_5_1_has_known_projection_peaks() {
     assert_peaks(Projection, [1429.443, 1549.279, 645.337, 872.606, 980.437, 562.162]);
 }
 
 #[test]
-fn case_5_1_has_the_known_peaks_by_virtual_work() {
+fn case_5_1_has_known_virtual_work_peaks() {
     assert_peaks(VirtualWork, [1370.248, 1485.085, 618.576, 854.363, 1014.466, 550.383]);
 }
 
 #[test]
-fn case_5_1_in_fifty_intervals_has_seven_states_at_each_of_its_angles() {
+fn case_5_1_has_seven_states_per_angle() {
     let states = swept(&PAPER_5_1, &load(20.0, Projection), 50).states;
     assert_eq!(states.len(), 51 * 7);
     assert!(!states.is_empty());
 }
 
 #[test]
-fn case_5_1_has_no_undercut_and_seven_teeth_in_each_zone() {
+fn case_5_1_has_seven_teeth_per_zone() {
     let drive = drive(&PAPER_5_1);
     assert_eq!(drive.flank_limit().end, FlankEnd::RegularTip);
     let mesh = Mesh::new(&drive);
@@ -51,18 +51,18 @@ fn case_5_1_has_no_undercut_and_seven_teeth_in_each_zone() {
 }
 
 #[test]
-fn case_5_2_is_undercut_with_four_or_five_teeth_in_each_zone() {
+fn case_5_2_is_undercut_with_few_teeth() {
     let drive = drive(&PAPER_5_2);
     assert_eq!(drive.flank_limit().end, FlankEnd::Undercut);
     let mesh = Mesh::new(&drive);
-    // 9.690577523835 are the digits known, cut and not rounded.
+    // 9.690577523835 is truncated, not rounded.
     assert!((mesh.coincidence_degree() - 9.690_577_523_835_5).abs() <= 5e-13, "{}", mesh.coincidence_degree());
     assert!((drive.flank_limit().position.from_lobe_deg() - 43.60759885726).abs() < 5e-12);
     assert_eq!(mesh.teeth_in_mesh(), TeethInMesh { min: 4, max: 5 });
 }
 
 #[test]
-fn case_5_2_bored_has_the_papers_three_or_four_teeth() {
+fn bored_case_5_2_has_few_teeth() {
     let drive = drive(&PAPER_5_2_BORED);
     assert_eq!(drive.flank_limit().end, FlankEnd::Bore);
     let mesh = Mesh::new(&drive);

@@ -1,4 +1,4 @@
-//! Parts as they are made, and the room that they leave each other.
+//! Parts as they are made, and the space between them.
 
 use std::f64::consts::PI;
 
@@ -14,7 +14,7 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, drive, ellipse};
 
-/// The first closed path of a part's section.
+/// Returns the first closed path of a part's section.
 fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> Vec<Edge> {
     let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
     let draft = Draft::new(parameters).unwrap();
@@ -30,14 +30,14 @@ fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> V
         .unwrap()
 }
 
-/// What there is to say about a part as it is made.
+/// Returns the findings about a part as it is made.
 fn findings_as_made(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> Vec<Finding> {
     let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
     let draft = Draft::new(parameters).unwrap();
     Drawing::new(&draft, Subject::Part(part), parts, &drawing).unwrap().findings().unwrap()
 }
 
-/// Where a wall of slot 0 cuts a circle, and its mirror image in the line between the slots 0 and 1.
+/// Returns where a wall of slot 0 meets a circle, and the mirror image at the wall of slot 1.
 fn on_both_walls(radius_mm: f64, wall_mm: f64, installed: i64) -> [Point2<f64>; 2] {
     let near = Point2::new((radius_mm * radius_mm - wall_mm * wall_mm).sqrt(), wall_mm);
     let to_next = Rotation2::new(2.0 * PI / installed as f64);
@@ -45,11 +45,11 @@ fn on_both_walls(radius_mm: f64, wall_mm: f64, installed: i64) -> [Point2<f64>; 
 }
 
 #[test]
-fn the_wall_between_two_slots_is_as_thick_as_the_points_where_they_cut_the_inner_circle_are_apart() {
+fn slot_wall_thickness_is_distance_at_inner_circle() {
     for (tooth_radius_mm, is_wall) in [(5.0, true), (2.0, true), (7.0, false)] {
         let p = DriveParameters { tooth_radius_mm, ..PAPER_5_1 };
         let [near, next] = on_both_walls(58.0, tooth_radius_mm, p.installed);
-        // Beyond the line between the slots the wall is less than nothing.
+        // Beyond the line between the slots the wall thickness is negative.
         let between = Rotation2::new(PI / 28.0).inverse() * near;
         let wall = (near - next).norm().copysign(-between.y);
         let found = drive(&p).slot_wall_mm();
@@ -59,7 +59,7 @@ fn the_wall_between_two_slots_is_as_thick_as_the_points_where_they_cut_the_inner
 }
 
 #[test]
-fn a_carrier_without_radii_leaves_a_tenth_of_the_annulus_free_on_either_side() {
+fn default_carrier_leaves_tenth_of_annulus_free() {
     let radii: Vec<_> = edges(&PAPER_5_1, Part::Carrier, &PartsParameters::default())
         .into_iter()
         .filter_map(|edge| match edge {
@@ -73,7 +73,7 @@ fn a_carrier_without_radii_leaves_a_tenth_of_the_annulus_free_on_either_side() {
 }
 
 #[test]
-fn a_tooth_presses_on_an_edge_of_the_carrier_where_its_centre_leaves_the_annulus() {
+fn tooth_presses_carrier_edge_outside_annulus() {
     let edges = |tooth_radius_mm| -> Vec<_> {
         let found = findings::of_drive(&drive(&DriveParameters { tooth_radius_mm, ..PAPER_5_1 })).unwrap();
         let edge = |finding: &Finding| match *finding {
@@ -90,14 +90,14 @@ fn a_tooth_presses_on_an_edge_of_the_carrier_where_its_centre_leaves_the_annulus
 }
 
 #[test]
-fn a_pointed_finger_ends_where_the_walls_of_its_two_slots_meet() {
+fn pointed_finger_ends_where_slot_walls_meet() {
     let p = DriveParameters { tooth_radius_mm: 7.0, ..PAPER_5_1 };
     let finger = edges(&p, Part::Carrier, &PartsParameters::default());
     let [Edge::Line { start: apex, end: outer }, Edge::Arc { .. }, Edge::Line { end: closed, .. }] = &finger[..] else {
         panic!("{finger:?}")
     };
     assert_eq!(apex, closed);
-    // On the wall of slot 0, and as far from the middle of slot 1.
+    // On the wall of slot 0, and equally far from the middle of slot 1.
     assert!((apex.y - 7.0).abs() < 1e-12 && (outer.y - 7.0).abs() < 1e-12);
     let from_next = Rotation2::new(-2.0 * PI / 28.0) * apex;
     assert!((from_next.y + 7.0).abs() < 1e-12, "{from_next}");
@@ -105,7 +105,7 @@ fn a_pointed_finger_ends_where_the_walls_of_its_two_slots_meet() {
 }
 
 #[test]
-fn the_curves_of_a_wave_generator_start_and_end_across_the_radius_and_follow_each_other() {
+fn wave_generator_curves_join_and_end_radially() {
     for wave_generator in [
         PAPER_5_1.wave_generator,
         WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 63.0, amplitude_mm: 1.0 },
@@ -127,9 +127,9 @@ fn the_curves_of_a_wave_generator_start_and_end_across_the_radius_and_follow_eac
 }
 
 #[test]
-fn a_bore_leaves_some_of_the_wave_generator_as_it_is_made() {
+fn bore_must_leave_some_wave_generator() {
     let draft = Draft::new(&PAPER_5_1).unwrap();
-    // Of 56 mm across, a quarter of a millimetre clear of the teeth and set back by a half.
+    // Least radius 56 mm, minus a clearance of 0.25 mm and an offset of 0.5 mm.
     let modification = Modification { wave_generator_equidistant_um: 500.0, ..Modification::default() };
     let is_possible = |bore_mm| {
         let bore_radius_mm = Some(bore_mm);
@@ -140,9 +140,9 @@ fn a_bore_leaves_some_of_the_wave_generator_as_it_is_made() {
     assert!(is_possible(55.249) && !is_possible(55.25) && !is_possible(56.0));
 }
 
-/// Set back by more its outline would have turned inside out where it is sharpest, or nothing would be left of it.
+/// The limit is the smaller of the least radius of curvature and the least radius. Beyond it the outline inverts.
 #[test]
-fn a_wave_generators_greatest_clearance_is_its_least_radius_of_curvature_or_its_least_radius() {
+fn greatest_cam_clearance_is_least_radius() {
     for (wave_generator, least_mm) in [
         (ellipse(58.0, 40.0), None),
         (WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 57.0, amplitude_mm: 1.0 }, None),
@@ -172,7 +172,7 @@ fn a_wave_generators_greatest_clearance_is_its_least_radius_of_curvature_or_its_
 }
 
 #[test]
-fn the_widest_finger_fills_the_annulus_between_slots_as_wide_as_teeth() {
+fn widest_finger_fills_annulus_between_slots() {
     let finger = widest_finger(&drive(&PAPER_5_1)).unwrap();
     let corners: Vec<_> = finger.iter().map(Edge::start).collect();
     let ([inner, inner_next], [outer, outer_next]) = (on_both_walls(58.0, 5.0, 28), on_both_walls(66.0, 5.0, 28));
@@ -183,7 +183,7 @@ fn the_widest_finger_fills_the_annulus_between_slots_as_wide_as_teeth() {
 }
 
 #[test]
-fn a_flat_sided_tooth_is_two_arcs_around_its_centre_joined_by_its_flats() {
+fn flat_sided_tooth_is_two_arcs_and_flats() {
     let tooth = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 6.0 };
     let p = DriveParameters { tooth, ..PAPER_5_1 };
     let outline = edges(&p, Part::Teeth, &PartsParameters::default());
@@ -192,7 +192,7 @@ fn a_flat_sided_tooth_is_two_arcs_around_its_centre_joined_by_its_flats() {
     else {
         panic!("{outline:?}")
     };
-    // Of the radius 5, with flats of the length 6: corners at (±3, ±4).
+    // Radius 5 with flats of length 6: corners at (±3, ±4).
     let corners = [(3.0, -4.0), (3.0, 4.0), (-3.0, 4.0), (-3.0, -4.0)].map(|(x, y)| Point2::new(x, y));
     for (i, edge) in [right, upper, left, lower].into_iter().enumerate() {
         assert!((edge.start() - corners[i]).norm() < 1e-14 * 5.0, "{edge:?}");
@@ -206,7 +206,7 @@ fn a_flat_sided_tooth_is_two_arcs_around_its_centre_joined_by_its_flats() {
 }
 
 #[test]
-fn a_ring_made_with_clearance_is_undercut_by_its_own_distance_from_the_path() {
+fn clearance_undercuts_ring_by_offset_from_path() {
     let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
     let p = DriveParameters { tooth_radius_mm: 0.999 * critical, ..PAPER_5_1 };
     assert_eq!(drive(&p).flank_limit().end, FlankEnd::RegularTip);
@@ -226,7 +226,7 @@ fn a_ring_made_with_clearance_is_undercut_by_its_own_distance_from_the_path() {
 }
 
 #[test]
-fn a_bore_that_just_meets_an_undercut_tip_does_not_move_the_end_of_the_flank_outward() {
+fn bore_at_undercut_tip_keeps_flank_end() {
     let mut tried = 0;
     for tenth_um in 1..400_u32 {
         let unbored = DriveParameters { tooth_radius_mm: 0.7 + 1e-3 * f64::from(tenth_um), ..PAPER_5_2 };
@@ -244,11 +244,11 @@ fn a_bore_that_just_meets_an_undercut_tip_does_not_move_the_end_of_the_flank_out
 }
 
 #[test]
-fn a_clearance_that_alone_undercuts_the_ring_is_told_with_the_distance_from_which_on_it_does() {
+fn undercut_by_clearance_reports_critical_distance() {
     let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
     let p = DriveParameters { tooth_radius_mm: 0.999 * critical, ..PAPER_5_1 };
     let (a, b, r, k) = (58.0, 56.0, p.tooth_radius_mm, 13.0);
-    // As above: the clearance at which the flank's curvature radius at the tip is nothing.
+    // As above: at this clearance the flank's radius of curvature at the tip is zero.
     let narrowing = k * k * (a * a - b * b) / (a * a + b * r);
     let most_um = 1e3 * (b + 2.0 * r - r * narrowing) / (narrowing - 1.0);
     let of = |parameters: &DriveParameters, ring_clearance_um| {
@@ -262,12 +262,12 @@ fn a_clearance_that_alone_undercuts_the_ring_is_told_with_the_distance_from_whic
     };
     assert!((distance_mm - (r + 1.001e-3 * most_um)).abs() < 1e-12);
     assert!((critical_distance_mm - (r + 1e-3 * most_um)).abs() < 1e-9, "{critical_distance_mm} at {most_um} µm");
-    // What undercuts without it is not the clearance's doing.
+    // An undercut without the clearance gives no finding about it.
     assert_eq!(of(&PAPER_5_2, 1.0), []);
 }
 
 #[test]
-fn walls_are_thin_below_a_quarter_of_a_slots_width() {
+fn wall_below_quarter_of_slot_width_is_thin() {
     // Slots of 10 mm; the ring's root at 58 + 2 · 5, the cam's least radius 56.
     for (thickness_mm, is_thin) in [(2.499, true), (2.501, false)] {
         let rim = PartsParameters { ring_outer_radius_mm: Some(68.0 + thickness_mm), ..PartsParameters::default() };
@@ -296,8 +296,8 @@ fn walls_are_thin_below_a_quarter_of_a_slots_width() {
 }
 
 #[test]
-fn a_tooth_leaves_a_slot_whose_walls_end_before_its_centre_does() {
-    // A wall that is 5 mm beside the slot's middle ends √(R² - 25) from the axis; centres run from 61 to 63 mm, loaded ones down to 61.
+fn tooth_leaves_slot_with_short_walls() {
+    // A wall 5 mm from the slot's middle ends √(R² - 25) from the axis. Centres run from 61 mm to 63 mm, loaded too.
     let wall_end_mm = |radius_mm: f64| (radius_mm * radius_mm - 25.0_f64).sqrt();
     let of = |inner_mm, outer_mm| {
         let parts = PartsParameters {
@@ -314,7 +314,7 @@ fn a_tooth_leaves_a_slot_whose_walls_end_before_its_centre_does() {
         };
         found.iter().map(edge).collect::<Vec<_>>()
     };
-    // Between 60.9 and 63.1 there is wall for all.
+    // Between 60.9 and 63.1 the wall holds all teeth.
     let (enough_inner, enough_outer) = (60.9_f64.hypot(5.0), 63.1_f64.hypot(5.0));
     assert_eq!(of(enough_inner, enough_outer), []);
     for (found, edge, center_mm, radius_mm) in [
@@ -328,7 +328,7 @@ fn a_tooth_leaves_a_slot_whose_walls_end_before_its_centre_does() {
 }
 
 #[test]
-fn an_outline_is_refused_where_it_has_one_chord_more_than_allowed() {
+fn outline_with_one_chord_too_many_is_refused() {
     for (parameters, part) in [(PAPER_5_1, Part::Ring), (PAPER_5_2, Part::Ring), (PAPER_5_1, Part::WaveGenerator)] {
         let chords = |edge: &Edge| match edge {
             Edge::Curve { points, .. } => points.len() as u64 - 1,

@@ -1,4 +1,4 @@
-//! The sampled profiles: true to the chord tolerance, closed, joining.
+//! Sampled profiles: chord tolerance, closure and joints.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -17,7 +17,7 @@ fn sampled(parameters: &DriveParameters, chord_tolerance_mm: f64, extent: Extent
     profiles(&drive(parameters), &request, &Never).unwrap()
 }
 
-/// Distance of a point from a polyline's nearest segment.
+/// Returns the distance of a point from the nearest segment of a polyline.
 fn distance_mm(point: &Point2<f64>, polyline: &Polyline) -> f64 {
     let to_segment = |pair: &[Point2<f64>]| {
         let along = pair[1] - pair[0];
@@ -27,7 +27,7 @@ fn distance_mm(point: &Point2<f64>, polyline: &Polyline) -> f64 {
     polyline.windows(2).map(to_segment).fold(f64::INFINITY, f64::min)
 }
 
-/// The farthest that the fine polyline strays from the coarse one.
+/// Returns the largest distance of the fine polyline from the coarse one.
 fn deviation_mm(fine: &Polyline, coarse: &Polyline) -> f64 {
     fine.iter().step_by(7).map(|point| distance_mm(point, coarse)).fold(0.0, f64::max)
 }
@@ -36,7 +36,7 @@ fn unit(angle_rad: f64) -> Vector2<f64> {
     Vector2::new(angle_rad.cos(), angle_rad.sin())
 }
 
-/// Points of ring, path and cam from the root, the lobe on, by their closed forms over the cam's normal or, where the path is given, over ψ.
+/// Samples ring, path and cam from root and lobe on, by closed forms over the cam's normal, or over ψ on a given path.
 fn closed_forms(p: &DriveParameters) -> [Polyline; 3] {
     let (r, lobes) = (p.tooth_radius_mm, p.wave_generator.lobes() as f64);
     let k = p.ring_teeth as f64 / lobes;
@@ -77,7 +77,7 @@ fn closed_forms(p: &DriveParameters) -> [Polyline; 3] {
     curves
 }
 
-/// How far the closed forms are from the chords, over the tolerance: of ring, path and cam.
+/// Returns the largest distances of ring, path and cam from the chords, over the tolerance.
 fn deviations_over_tolerance(p: &DriveParameters, curves: &[Polyline; 3], tolerance_mm: f64) -> [f64; 3] {
     let profiles = sampled(p, tolerance_mm, Extent::Tooth);
     let from_middle = |curve: &Polyline| curve[curve.len() / 2..].to_vec();
@@ -88,7 +88,7 @@ fn deviations_over_tolerance(p: &DriveParameters, curves: &[Polyline; 3], tolera
         profiles.wave_generator[..=of_half_lobe].to_vec(),
     ];
     std::array::from_fn(|i| {
-        // Both run the same way: the nearest chord of a point is looked for from that of the point before it on.
+        // Both curves have the same direction, so the search for a nearest chord starts at the previous one.
         let mut nearest = 0;
         let mut worst_mm = 0.0_f64;
         for point in &curves[i] {
@@ -102,19 +102,19 @@ fn deviations_over_tolerance(p: &DriveParameters, curves: &[Polyline; 3], tolera
     })
 }
 
-/// Beside the tolerance, what rounding adds.
+/// True if the deviation is within tolerance and rounding.
 fn is_true(deviation_over_tolerance: f64) -> bool {
     deviation_over_tolerance <= 1.0 + 1e-6
 }
 
-/// From this many points on a chord of 40 might be passed by between two points of the closed form.
+/// Exponents of relative tolerances. Below them, closed forms are sampled too coarsely to test each chord.
 const RELATIVE_TOLERANCES: std::ops::Range<f64> = -6.0..-2.5;
 
 proptest! {
     #![proptest_config(cases(192))]
 
     #[test]
-    fn no_point_of_a_curve_is_farther_from_its_chord_than_the_tolerance(
+    fn chords_keep_tolerance_at_every_point(
         p in any_of_the_family(),
         exponents in prop::collection::vec(RELATIVE_TOLERANCES, 12),
     ) {
@@ -127,9 +127,9 @@ proptest! {
     }
 }
 
-/// With the inflection near one end of a chord both its end tangents lie on one side of it.
+/// Both end tangents then lie on the same side of the chord.
 #[test]
-fn a_chord_with_an_inflection_near_its_end_is_true_to_the_tolerance() {
+fn chord_with_inflection_near_end_keeps_tolerance() {
     let p = DriveParameters {
         wave_generator: WaveGenerator::HarmonicPath {
             lobes: 2,
@@ -150,9 +150,9 @@ fn a_chord_with_an_inflection_near_its_end_is_true_to_the_tolerance() {
     }
 }
 
-/// Of a circle's chord over the angle θ its tangents stand `c tan(θ/2)/2` high. Positions are spaced by a few per cent more or less than the circle's own angles.
+/// The tangents of a chord over angle θ meet at height `c tan(θ/2)/2`. Spacing differs from the circle's by per cent.
 #[test]
-fn a_circle_is_halved_until_the_triangles_of_chords_and_tangents_are_as_low_as_the_tolerance() {
+fn circle_is_bisected_until_tangent_triangles_fit() {
     let radius_mm = 57.0;
     let wave_generator = WaveGenerator::Eccentric { radius_mm, eccentricity_mm: 1.0 };
     let p = DriveParameters { wave_generator, ring_teeth: 27, ..PAPER_5_1 };
@@ -168,14 +168,14 @@ fn a_circle_is_halved_until_the_triangles_of_chords_and_tangents_are_as_low_as_t
 }
 
 #[test]
-fn every_chord_is_true_to_the_tolerance() {
+fn every_chord_keeps_the_tolerance() {
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
         for tolerance in [0.1, 0.01, 0.001] {
             let (coarse, fine) = (
                 sampled(&parameters, tolerance, Extent::Tooth),
                 sampled(&parameters, tolerance / 400.0, Extent::Tooth),
             );
-            // The fine curve is itself a 400th off.
+            // The fine curve has an error of 1/400 itself.
             let allowed = tolerance * (1.0 + 1.0 / 400.0);
             assert!(deviation_mm(&fine.ring, &coarse.ring) <= allowed);
             assert!(deviation_mm(&fine.tooth_center_path, &coarse.tooth_center_path) <= allowed);
@@ -188,7 +188,7 @@ proptest! {
     #![proptest_config(cases(96))]
 
     #[test]
-    fn a_profile_has_no_more_points_than_are_expected(parameters in any_drive(), tolerance in -6..0_i32, is_full in any::<bool>()) {
+    fn profile_has_at_most_expected_points(parameters in any_drive(), tolerance in -6..0_i32, is_full in any::<bool>()) {
         let extent = if is_full { Extent::Full } else { Extent::Tooth };
         let chord_tolerance_mm = 10.0_f64.powi(tolerance) * parameters.tooth_radius_mm;
         let drive = drive(&parameters);
@@ -200,7 +200,7 @@ proptest! {
     }
 
     #[test]
-    fn teeth_join_and_the_ring_closes(parameters in any_drive()) {
+    fn teeth_join_and_ring_closes(parameters in any_drive()) {
         let p = &parameters;
         let tooth = sampled(p, 1e-3 * p.tooth_radius_mm, Extent::Tooth).ring;
         let (first, last) = (tooth[0], tooth[tooth.len() - 1]);
@@ -217,7 +217,7 @@ proptest! {
     }
 
     #[test]
-    fn the_flank_runs_monotonically_from_root_to_tip_without_spikes(parameters in any_drive()) {
+    fn flank_runs_monotonically_without_spikes(parameters in any_drive()) {
         let drive = drive(&parameters);
         let tooth = sampled(&parameters, 1e-3 * parameters.tooth_radius_mm, Extent::Tooth).ring;
         let half = &tooth[tooth.len() / 2..];
@@ -233,7 +233,7 @@ proptest! {
 }
 
 #[test]
-fn the_whole_wave_generator_is_an_ellipse_and_the_whole_ring_and_path_repeat_from_tooth_to_tooth() {
+fn full_profiles_repeat_and_generator_is_ellipse() {
     for parameters in [PAPER_5_1, PAPER_5_2_BORED] {
         let all = sampled(&parameters, 1e-2, Extent::Full);
         let (a, b) = semi_axes_mm(&parameters);
@@ -253,20 +253,20 @@ fn the_whole_wave_generator_is_an_ellipse_and_the_whole_ring_and_path_repeat_fro
 }
 
 #[test]
-fn a_bored_tip_has_its_land_on_the_bore() {
+fn bored_tip_has_land_on_bore() {
     let ring = sampled(&PAPER_5_2_BORED, 1e-7, Extent::Tooth).ring;
     let on_land = ring.iter().filter(|point| (point.coords.norm() - 52.8227).abs() < 1e-12).count();
     assert!(on_land > 4, "{on_land} points");
 }
 
 #[test]
-fn a_profile_of_too_many_points_is_refused_with_their_number() {
+fn profile_with_too_many_points_reports_their_number() {
     let request = ProfileParameters { chord_tolerance_mm: 1e-3, extent: Extent::Full, max_points: 1000 };
     let refused = profiles(&drive(&PAPER_5_1), &request, &Never).unwrap_err();
     assert!(matches!(refused, SolveError::TooManyPoints { points, limit: 1000 } if points > 1000));
 }
 
-/// Counts how often it is asked; each halving of a chord asks once.
+/// A stop flag that counts the bisections of chords.
 #[derive(Default)]
 struct Halvings(AtomicU64);
 
@@ -278,18 +278,18 @@ impl Stop for Halvings {
 }
 
 #[test]
-fn a_profile_of_far_too_many_points_is_given_up_before_it_is_whole() {
+fn far_too_large_profile_is_abandoned_early() {
     let halvings = Halvings::default();
     let request = ProfileParameters { chord_tolerance_mm: 1e-13, extent: Extent::Tooth, max_points: 1000 };
     let refused = profiles(&drive(&PAPER_5_1), &request, &halvings).unwrap_err();
     assert!(matches!(refused, SolveError::TooManyPoints { points: 1001, limit: 1000 }), "{refused:?}");
-    // A chord takes a halving, and the last one some more on the way down to it.
+    // Each chord takes one bisection, and the last one some more.
     let halvings = halvings.0.into_inner();
     assert!(halvings < 1100, "{halvings}");
 }
 
 #[test]
-fn a_profile_is_refused_where_it_has_one_point_more_than_allowed() {
+fn profile_with_one_point_too_many_is_refused() {
     for (parameters, extent) in
         [(PAPER_5_1, Extent::Tooth), (PAPER_5_1, Extent::Full), (PAPER_5_2, Extent::Full), (PAPER_5_2, Extent::Tooth)]
     {

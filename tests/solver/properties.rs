@@ -25,7 +25,7 @@ fn scaled(p: &DriveParameters, factor: f64) -> DriveParameters {
     }
 }
 
-/// The six columns of forces and stresses with their peaks.
+/// Returns the six columns of forces and stresses with their peaks.
 fn loads(sweep: &Sweep) -> Vec<(&Vec<f64>, f64)> {
     let force = sweep.states.force_n.iter().map(|(c, column)| (column, sweep.peaks.get(c).force_n.value));
     let stress = sweep.states.stress_mpa.iter().map(|(c, column)| (column, sweep.peaks.get(c).stress_mpa.value));
@@ -42,7 +42,7 @@ proptest! {
     }
 
     #[test]
-    fn a_period_closes(parameters in any_swept_drive(), compatibility in any_compatibility()) {
+    fn period_closes(parameters in any_swept_drive(), compatibility in any_compatibility()) {
         let residual = swept(&parameters, &load(7.0, compatibility), 13).period_closure_residual;
         prop_assert!(residual < 1e-12, "{residual:e}");
     }
@@ -57,10 +57,10 @@ proptest! {
     }
 
     #[test]
-    fn a_drive_twice_as_large_carries_the_same_forces_under_twice_the_torque(parameters in any_swept_drive()) {
+    fn doubled_drive_carries_same_forces_under_doubled_torque(parameters in any_swept_drive()) {
         let small = swept(&parameters, &load(3.0, VirtualWork), 10);
         let large = swept(&scaled(&parameters, 2.0), &load(6.0, VirtualWork), 10);
-        // A factor of two is exact in doubles, so the same digits come out.
+        // A factor of two is exact in doubles, so the digits are equal.
         prop_assert_eq!(&small.states.force_n, &large.states.force_n);
         for (contact, column) in small.states.stress_mpa.iter() {
             for (small, large) in column.iter().zip(large.states.stress_mpa.get(contact)) {
@@ -70,7 +70,7 @@ proptest! {
     }
 
     #[test]
-    fn forces_grow_with_the_torque_and_stresses_with_its_root(parameters in any_swept_drive(), compatibility in any_compatibility()) {
+    fn forces_grow_with_torque_and_stresses_with_root(parameters in any_swept_drive(), compatibility in any_compatibility()) {
         let light = swept(&parameters, &load(1.0, compatibility), 10);
         let heavy = swept(&parameters, &load(4.0, compatibility), 10);
         for (contact, column) in light.states.force_n.iter() {
@@ -86,7 +86,7 @@ proptest! {
     }
 
     #[test]
-    fn with_three_equal_stiffnesses_projection_shares_the_load_by_lever_arm(parameters in any_swept_drive()) {
+    fn equal_stiffness_projection_shares_load_by_arm(parameters in any_swept_drive()) {
         let sweep = swept(&parameters, &load(5.0, Projection), 6);
         let states = &sweep.states;
         let mut ratio = None;
@@ -102,7 +102,7 @@ proptest! {
     }
 }
 
-/// The largest step of `F_K` from one sample to the next, over its peak, for teeth that are in mesh at both.
+/// Returns the largest step of `F_K` between samples, over its peak, for teeth in mesh at both samples.
 fn largest_step(parameters: &DriveParameters, samples: u64) -> f64 {
     let sweep = swept(parameters, &load(3.0, Projection), samples);
     let states = &sweep.states;
@@ -110,7 +110,7 @@ fn largest_step(parameters: &DriveParameters, samples: u64) -> f64 {
     let mut before = std::collections::BTreeMap::new();
     let mut largest = 0.0_f64;
     for (tooth, force) in states.tooth.iter().zip(force) {
-        // A tooth stands once at each angle, so what it bore last it bore at the angle before.
+        // A tooth appears once at each angle, so its previous load is at the previous angle.
         if let Some(last) = before.insert(tooth, force) {
             largest = largest.max((force - last).abs());
         }
@@ -119,13 +119,13 @@ fn largest_step(parameters: &DriveParameters, samples: u64) -> f64 {
 }
 
 #[test]
-fn without_undercut_forces_are_continuous_over_the_input_angle() {
+fn forces_are_continuous_without_undercut() {
     let (coarse, fine) = (largest_step(&PAPER_5_1, 100), largest_step(&PAPER_5_1, 1000));
     assert!(fine < 0.11 * coarse, "steps shrink with the samples: {coarse} {fine}");
 }
 
 #[test]
-fn with_undercut_or_a_bore_forces_jump_where_a_tooth_enters() {
+fn forces_jump_at_entry_with_undercut_or_bore() {
     for parameters in [PAPER_5_2, PAPER_5_2_BORED] {
         let (coarse, fine) = (largest_step(&parameters, 100), largest_step(&parameters, 1000));
         assert!(coarse > 0.1 && fine > 0.9 * coarse, "the jump stays: {coarse} {fine}");
@@ -133,7 +133,7 @@ fn with_undercut_or_a_bore_forces_jump_where_a_tooth_enters() {
 }
 
 #[test]
-fn a_tooth_enters_under_load_where_the_flank_is_cut_short_and_without_load_at_a_regular_tip() {
+fn only_shortened_flanks_admit_teeth_under_load() {
     let first_force = |parameters: &DriveParameters| {
         let sweep = swept(parameters, &load(3.0, Projection), 4000);
         let states = &sweep.states;
@@ -146,14 +146,14 @@ fn a_tooth_enters_under_load_where_the_flank_is_cut_short_and_without_load_at_a_
 }
 
 #[test]
-fn the_output_torque_is_the_input_torque_times_the_ratio_of_torques() {
+fn output_torque_is_input_torque_times_ratio() {
     let mut by_output = load(0.0, Projection);
     by_output.torque = Torque::Output(20.0 * 14.0);
     assert_eq!(swept(&PAPER_5_1, &by_output, 50).states, swept(&PAPER_5_1, &load(20.0, Projection), 50).states);
 }
 
 #[test]
-fn an_installed_tooth_fewer_in_the_ring_or_more_changes_the_sense_of_rotation() {
+fn tooth_difference_sign_sets_sense_of_rotation() {
     let fewer = drive(&PAPER_5_1);
     let more = drive(&DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..PAPER_5_1 });
     assert_eq!((fewer.transmission_ratio(), fewer.transmission_ratio_carrier_fixed()), (14.0, -13.0));
@@ -161,11 +161,11 @@ fn an_installed_tooth_fewer_in_the_ring_or_more_changes_the_sense_of_rotation() 
 }
 
 #[test]
-fn just_above_the_critical_radius_the_flank_ends_just_before_the_minor_axis() {
+fn flank_ends_near_axis_above_critical_radius() {
     let critical = drive(&PAPER_5_1).flank().critical_tooth_radius_mm().unwrap();
     let at = |factor: f64| drive(&DriveParameters { tooth_radius_mm: critical * factor, ..PAPER_5_1 });
     assert_eq!(at(1.0 - 1e-9).flank_limit().end, FlankEnd::RegularTip);
     let short = |relative: f64| at(1.0 + relative).flank_limit().position.from_valley_rad;
-    // Like a square root: a hundredth of the distance, a tenth of the angle.
+    // Like a square root: a hundredth of the distance gives a tenth of the angle.
     assert!((short(1e-6) / short(1e-8) - 10.0).abs() < 1e-2);
 }

@@ -1,7 +1,7 @@
-//! Against the 60-digit calculation of `tests/reference/reference.py`, which was written without sight of this code.
+//! Results against `tests/reference/reference.py`, an independent calculation to 60 digits.
 //!
-//! Each case states its *condition*: what rounding the input alone does to each answer. Nothing can be right to more than that,
-//! and beside it next to nothing is allowed.
+//! Each case states its *condition*: the effect of rounding the input on each answer. The tests allow that and
+//! a small rounding error.
 
 use std::collections::BTreeMap;
 
@@ -18,10 +18,10 @@ use toothwave_solver::{
 
 use crate::drives::{ellipse, everywhere};
 
-/// What is allowed beside the condition, relative to the value or the column's peak.
+/// Allowed error beside the condition, relative to the value or the column's peak.
 const TOLERANCE: f64 = 1e-14;
 
-/// How many times the condition is allowed.
+/// Allowed multiple of the condition.
 const CONDITION_MULTIPLE: f64 = 1.0;
 
 pub(crate) struct Case(pub(crate) Value);
@@ -31,17 +31,17 @@ impl Case {
         Self::of(include_str!("../reference/cases.json"))
     }
 
-    /// Palmgren's law and clearances.
+    /// Reads cases of Palmgren's law and clearances.
     fn all_of_contact() -> Vec<Self> {
         Self::of(include_str!("../reference/cases_contact.json"))
     }
 
-    /// Johnson's law, series compliance, balls; clearances with `projection`, bores and very elliptic cams.
+    /// Reads cases of Johnson's law, series compliance, balls, projected clearances, bores and very elliptic cams.
     fn all_of_laws() -> Vec<Self> {
         Self::of(include_str!("../reference/cases_laws.json"))
     }
 
-    /// The cases of a file.
+    /// Reads the cases of a file.
     pub(crate) fn of(file: &str) -> Vec<Self> {
         let file: Value = serde_json::from_str(file).unwrap();
         file["cases"].as_array().unwrap().iter().cloned().map(Self).collect()
@@ -149,7 +149,7 @@ impl Case {
         sweep::sweep(&self.drive(), &self.load(), self.points(), &Never)
     }
 
-    /// An expected scalar with what its input's rounding does to it.
+    /// Returns an expected scalar and its condition.
     fn scalar(&self, name: &str) -> Option<(f64, f64)> {
         let value = number(&self.0["expected"][name])?;
         Some((value, self.0["condition"][name].as_f64().unwrap_or(0.0)))
@@ -164,7 +164,7 @@ pub(crate) fn number(value: &Value) -> Option<f64> {
     value.as_str().map(|text| text.parse().unwrap()).or_else(|| value.as_f64())
 }
 
-/// The worst error of each kind, in units of what is allowed.
+/// The worst error of each kind over the allowed error.
 #[derive(Default)]
 pub(crate) struct Worst(BTreeMap<String, (f64, String)>);
 
@@ -204,7 +204,7 @@ fn columns(states: &States) -> [(&'static str, &Vec<f64>); 11] {
 }
 
 #[test]
-fn geometry_and_mesh_agree_with_60_digits() {
+fn geometry_and_mesh_match_60_digits() {
     let mut worst = Worst::default();
     for case in Case::all() {
         let (name, drive) = (case.name(), case.drive());
@@ -236,7 +236,7 @@ fn geometry_and_mesh_agree_with_60_digits() {
     worst.assert_all_within();
 }
 
-/// Where a recorded row stands among the states.
+/// Returns the index of a recorded row among the states.
 fn index_of(mesh: &Mesh, samples: Samples, rows: &Value, row: usize) -> usize {
     let (tooth, sample) = (rows["tooth"][row].as_u64().unwrap(), rows["input_index"][row].as_u64().unwrap());
     let before: usize = (0..sample).map(|sample| mesh.teeth_at(sample, samples).count()).sum();
@@ -276,7 +276,7 @@ fn see_sweep(case: &Case, worst: &mut Worst) {
 }
 
 #[test]
-fn every_column_of_a_sweep_agrees_with_60_digits() {
+fn every_sweep_column_matches_60_digits() {
     let mut worst = Worst::default();
     for case in Case::all() {
         see_sweep(&case, &mut worst);
@@ -285,7 +285,7 @@ fn every_column_of_a_sweep_agrees_with_60_digits() {
 }
 
 #[test]
-fn palmgrens_law_and_clearances_agree_with_60_digits() {
+fn palmgrens_law_and_clearances_match_60_digits() {
     let mut worst = Worst::default();
     for case in Case::all_of_contact() {
         see_sweep(&case, &mut worst);
@@ -293,7 +293,7 @@ fn palmgrens_law_and_clearances_agree_with_60_digits() {
     worst.assert_all_within();
 }
 
-/// Forces and stresses at the recorded rows, and the wind-up at every input angle, worked out angle by angle: teeth of any shape.
+/// Compares forces and stresses at the recorded rows, and the wind-up at every angle, for teeth of any shape.
 fn see_states(case: &Case, worst: &mut Worst) {
     let (name, samples) = (case.name(), case.samples());
     let (drive, load) = (case.drive(), case.load());
@@ -335,7 +335,7 @@ fn see_states(case: &Case, worst: &mut Worst) {
 }
 
 #[test]
-fn johnsons_law_balls_series_compliance_and_gaps_under_projection_agree_with_40_digits() {
+fn further_laws_and_projected_gaps_match_40_digits() {
     let mut worst = Worst::default();
     for case in Case::all_of_laws() {
         see_states(&case, &mut worst);
@@ -346,23 +346,24 @@ fn johnsons_law_balls_series_compliance_and_gaps_under_projection_agree_with_40_
     worst.assert_all_within();
 }
 
-/// What a group of cases comes to.
+/// Summary of a group of cases.
 #[derive(Default)]
 struct Row {
     cases: usize,
-    /// Numbers that were compared.
+    /// Number of compared values.
     numbers: usize,
     /// Worst error of geometry, forces and stresses, over the column's peak.
     errors: [f64; 3],
     /// Largest condition of a column.
     condition: f64,
-    /// Worst error over the condition of its column, beside which one unit of rounding is allowed.
+    /// Worst error over its column's condition, after one unit of rounding.
     multiple: f64,
 }
 
-/// The table of docs/hard-cases.md and the figures of README.md: `cargo test -p toothwave-solver hard_cases -- --nocapture` prints it.
+/// `cargo test -p toothwave-solver hard_cases -- --nocapture` prints the table of tests/reference/hard-cases.md and the figures of
+/// README.md.
 #[test]
-fn hard_cases_stay_within_a_small_multiple_of_their_condition() {
+fn hard_cases_stay_near_their_condition() {
     let mut table: BTreeMap<String, Row> = BTreeMap::new();
     for case in Case::all().into_iter().chain(Case::all_of_contact()) {
         let row = table.entry(case.0["group"].as_str().unwrap().into()).or_default();
@@ -398,7 +399,7 @@ fn hard_cases_stay_within_a_small_multiple_of_their_condition() {
     );
 }
 
-/// The worst error of each column over the recorded rows, over the column's peak.
+/// Returns the worst error of each column at the recorded rows, over the column's peak.
 fn errors_over_peak(case: &Case, sweep: &Sweep) -> Vec<(&'static str, f64)> {
     let (mesh, samples) = (Mesh::new(&case.drive()), case.samples());
     let rows = &case.0["expected"]["rows"];

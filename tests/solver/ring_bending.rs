@@ -1,4 +1,4 @@
-//! How the ring's teeth bend: against finite elements, and what a bend must do to the loads.
+//! Bending of the ring's teeth: against finite elements, and its effect on loads.
 
 use serde_json::Value;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
@@ -10,13 +10,13 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse, load, swept};
 
-/// `(1 - ν²)/(π E L1)` of a ring.
+/// Returns `(1 - ν²)/(π E L1)` of a ring.
 fn unit_mm_per_n(drive: &Drive, ring: &Material) -> f64 {
     let modulus_mpa = 1e3 * ring.youngs_modulus_gpa / (1.0 - ring.poissons_ratio.powi(2));
     1.0 / (std::f64::consts::PI * modulus_mpa * drive.tooth_width_mm())
 }
 
-/// What the ring gives way by at a position beyond what it does at its root, in [`unit_mm_per_n`].
+/// Returns the ring's compliance at a position minus the one at its root, in [`unit_mm_per_n`].
 fn beyond_root(drive: &Drive, ring: &Material) -> impl Fn(f64) -> f64 {
     let bending = RingBending::new(drive, ring).unwrap();
     let unit_mm_per_n = unit_mm_per_n(drive, ring);
@@ -27,9 +27,9 @@ fn beyond_root(drive: &Drive, ring: &Material) -> impl Fn(f64) -> f64 {
     }
 }
 
-/// The contact itself gives way by some 21 of these units, so that 0.2 are a hundredth of it.
+/// The contact's own approach is about 21 of these units, so 0.2 is a hundredth of it.
 #[test]
-fn teeth_of_case_5_2_bend_as_those_of_finite_elements() {
+fn case_5_2_teeth_bend_like_finite_elements() {
     let found: Value = serde_json::from_str(include_str!("../finite_elements/ring_teeth.json")).unwrap();
     let teeth = found["teeth"].as_array().unwrap();
     let number = |tooth: &Value, name: &str| tooth[name].as_f64().unwrap();
@@ -44,9 +44,9 @@ fn teeth_of_case_5_2_bend_as_those_of_finite_elements() {
     }
 }
 
-/// A force at the corner of a wedge moves it by more than a half-plane (Michell), whatever land lies beyond.
+/// Michell: a force at a wedge's corner moves it more than a half-plane, with any land beyond.
 #[test]
-fn a_bored_ring_gives_way_the_more_the_nearer_the_force_is_to_its_corner() {
+fn bored_ring_is_softer_near_its_corner() {
     let wide_land = DriveParameters {
         wave_generator: ellipse(669.53, 572.498),
         teeth: 27,
@@ -66,7 +66,7 @@ fn a_bored_ring_gives_way_the_more_the_nearer_the_force_is_to_its_corner() {
 }
 
 #[test]
-fn a_ring_with_hardly_any_teeth_bends_nowhere_more_than_at_its_root() {
+fn ring_with_few_teeth_bends_most_at_root() {
     let shallow = DriveParameters { wave_generator: ellipse(58.0, 57.99), ..PAPER_5_1 };
     let drive = drive(&shallow);
     let at = beyond_root(&drive, &Material::STEEL);
@@ -75,9 +75,9 @@ fn a_ring_with_hardly_any_teeth_bends_nowhere_more_than_at_its_root() {
     }
 }
 
-/// Length for length the same ring, and another material of the same Poisson's ratio, bend by as many units.
+/// A scaled ring, or another material of the same Poisson's ratio, bends by as many units.
 #[test]
-fn a_bend_knows_no_scale() {
+fn bending_is_independent_of_scale() {
     let larger = DriveParameters {
         wave_generator: ellipse(507.0, 493.0),
         tooth_radius_mm: 15.0,
@@ -92,9 +92,9 @@ fn a_bend_knows_no_scale() {
     }
 }
 
-/// The last ring is remembered.
+/// The last ring is cached.
 #[test]
-fn a_remembered_ring_bends_as_a_new_one() {
+fn cached_ring_bends_like_new_one() {
     let (one, other) = (drive(&PAPER_5_2), drive(&PAPER_5_2_BORED));
     let new = |drive| RingBending::new(drive, &Material::STEEL).unwrap();
     let first = new(&one);
@@ -106,9 +106,9 @@ fn a_remembered_ring_bends_as_a_new_one() {
     assert_ne!(RingBending::new(&one, &softer).unwrap(), first);
 }
 
-/// By virtual work with stiffnesses of the designer's own there is one equation: each force is what is turned, by its arm, over the sum of what gives way.
+/// By virtual work with given stiffnesses, each force is rotation times arm over the sum of compliances.
 #[test]
-fn a_bend_stands_in_the_load_sharing_as_a_compliance_at_the_ring() {
+fn bending_acts_as_ring_compliance_in_load_sharing() {
     let stiffness_n_per_mm = PerContact { wave_generator: 4e5, ring: 3e5, carrier: 5e5 };
     let rigid = LoadParameters { law: ContactLaw::Fixed(stiffness_n_per_mm), ..load(3.0, VirtualWork) };
     for parameters in [PAPER_5_2, PAPER_5_2_BORED, PAPER_5_1] {
@@ -141,14 +141,14 @@ fn a_bend_stands_in_the_load_sharing_as_a_compliance_at_the_ring() {
 }
 
 #[test]
-fn projection_takes_no_ring_teeth_that_bend() {
+fn projection_rejects_bending_ring_teeth() {
     let refused = LoadCase::new(&LoadParameters { ring_teeth_bend: true, ..load(3.0, Projection) });
     assert_eq!(refused, Err(vec![Violation::NeedsVirtualWork { parameter: Parameter::RingTeethBend }]));
 }
 
-/// Rings of few teeth, flanks that are hardly any, and tips of every kind.
+/// Includes rings of few teeth, very short flanks, and all kinds of tips.
 #[test]
-fn every_ring_bends_by_a_finite_amount() {
+fn every_ring_bends_by_finite_amount() {
     let eccentric = |teeth: i64| DriveParameters {
         wave_generator: WaveGenerator::Eccentric { radius_mm: 20.0, eccentricity_mm: 0.5 },
         teeth,
@@ -170,7 +170,7 @@ fn every_ring_bends_by_a_finite_amount() {
 }
 
 #[test]
-fn along_a_flank_what_bends_changes_without_a_jump() {
+fn bending_is_continuous_along_flank() {
     const STEPS: u32 = 4000;
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
         let drive = drive(&parameters);

@@ -1,4 +1,4 @@
-//! The sharing of a load over springs, and light loads on wide gaps.
+//! Load sharing among springs, and light loads across wide gaps.
 
 use std::cell::Cell;
 use std::f64::consts::PI;
@@ -23,7 +23,7 @@ fn laws() -> [ContactLaw; 3] {
 }
 
 #[test]
-fn under_any_torque_and_any_gap_the_forces_balance_it_to_1e_12() {
+fn forces_balance_any_torque_to_1e_12() {
     let mut worst = (0.0_f64, String::new());
     for parameters in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED] {
         let drive = drive(&parameters);
@@ -48,10 +48,9 @@ fn under_any_torque_and_any_gap_the_forces_balance_it_to_1e_12() {
     assert!(worst.0 <= 1e-12, "{worst:?}");
 }
 
-/// A tooth that is pressed by 1e-313 mm at the closing angle of the next one took the logarithm of Johnson's law out of the range of doubles, and its
-/// stiffness.
+/// An approach of 1e-313 mm exceeds the range of doubles in the logarithm of Johnson's law.
 #[test]
-fn gaps_next_to_nothing_are_none_to_the_load() {
+fn negligible_gaps_do_not_change_loads() {
     let drive = drive(&PAPER_5_1);
     for law in [ContactLaw::Johnson { depth_mm: PerContact::default() }, ContactLaw::Palmgren, ContactLaw::Linear] {
         for torque_nm in [1e-12, 20.0, 1e3] {
@@ -79,10 +78,9 @@ fn gaps_next_to_nothing_are_none_to_the_load() {
     }
 }
 
-/// A rounding of the closing angles once told the teeth apart: under 1e-12 N·m forces came out five times too large, and a period of equally turned slots
-/// did not close.
+/// Rounding of closing angles must not separate the teeth under 1e-12 N·m.
 #[test]
-fn what_is_turned_alike_is_lost_motion_alone_however_light_the_load() {
+fn equal_rotation_is_lost_motion_under_any_load() {
     let drive = drive(&DriveParameters { teeth: 14, installed: 14, ring_teeth: 12, ..PAPER_5_1 });
     let arcsec = 60.0;
     let rad = arcsec * PI / 648_000.0;
@@ -122,8 +120,8 @@ fn what_is_turned_alike_is_lost_motion_alone_however_light_the_load() {
 }
 
 #[test]
-fn a_tooth_on_the_minor_axis_never_closes_the_gap_of_its_slot() {
-    // Gap and lever arm vanish there together; once it counted as closed from the start and alone carried what it could not.
+fn tooth_on_minor_axis_never_closes_slot_gap() {
+    // Gap and lever arm vanish there together, so the tooth must not count as closed.
     let drive = drive(&PAPER_5_1);
     let mut parameters = load(1e-9, VirtualWork);
     parameters.clearance_um.carrier = 1000.0;
@@ -135,7 +133,7 @@ fn a_tooth_on_the_minor_axis_never_closes_the_gap_of_its_slot() {
 }
 
 #[test]
-fn a_tooth_without_a_lever_arm_alone_carries_nothing_and_says_so() {
+fn tooth_without_arm_alone_carries_nothing() {
     let drive = drive(&PAPER_5_1);
     for contact in [None, Some(Contact::WaveGenerator), Some(Contact::Carrier)] {
         let mut parameters = load(20.0, VirtualWork);
@@ -151,7 +149,7 @@ fn a_tooth_without_a_lever_arm_alone_carries_nothing_and_says_so() {
 }
 
 #[test]
-fn a_gap_that_projection_would_turn_into_load_is_refused_by_the_crate_too() {
+fn crate_refuses_gap_that_projection_turns_into_load() {
     let larger = drive(&DriveParameters { ring_teeth: 30, tooth_radius_mm: 4.0, ..PAPER_5_1 });
     let mut parameters = load(20.0, Projection);
     parameters.clearance_um.carrier = 500.0;
@@ -162,8 +160,8 @@ fn a_gap_that_projection_would_turn_into_load_is_refused_by_the_crate_too() {
 }
 
 #[test]
-fn a_tooth_of_next_to_no_arm_that_closes_first_takes_no_digits_from_the_others() {
-    // It would have to turn by 1e9 rad to make the torque alone; beside it the next one is pressed by 1e-15 of what the first has turned.
+fn early_tooth_of_tiny_arm_costs_no_digits() {
+    // The first tooth alone would need 1e9 rad. The next one's approach is 1e-15 of the first one's way.
     let approach = Approach::Linear { compliance_mm_per_n: 1e-6 };
     let spring = |arm_mm: f64, closing_rad| Spring {
         travel_arm_mm: arm_mm,
@@ -180,7 +178,7 @@ fn a_tooth_of_next_to_no_arm_that_closes_first_takes_no_digits_from_the_others()
     assert_eq!(wind_up.rotation.closing_rad, 1.1);
 }
 
-/// Counts how often it is looked at.
+/// A spring that counts its reads.
 struct Counted(Spring, Cell<u64>);
 
 impl AsRef<Spring> for Counted {
@@ -191,13 +189,13 @@ impl AsRef<Spring> for Counted {
 }
 
 #[test]
-fn which_of_ten_thousand_teeth_carry_is_found_in_a_few_passes_over_them() {
+fn loaded_teeth_are_found_in_few_passes() {
     let looks = |count: u32, torque_nmm: f64| {
         let spring = |i: u32| Spring {
             travel_arm_mm: 1.0,
             static_arm_mm: 1.0,
             arm_decline_mm_per_rad: 0.0,
-            // In no order, and all unlike.
+            // Unsorted and all different.
             closing_rad: 1e-6 * f64::from(i * 7919 % count),
             approach: Approach::Power { exponent: 0.9, coefficient: 1e-6, compliance_mm_per_n: 0.0 },
         };
@@ -235,7 +233,7 @@ prop_compose! {
 }
 
 #[test]
-fn a_logarithmic_approach_is_undone_by_its_inverse_and_goes_on_along_its_tangent_beyond_its_limit() {
+fn logarithmic_approach_is_inverted_and_extended_along_tangent() {
     for (compliance, growth, reference_n) in
         [(3e-6, 1e-6, 1e4), (0.0, 2e-6, 50.0), (1e-4, 1e-8, 1e9), (-1e-7, 1e-6, 1.0)]
     {
@@ -258,19 +256,19 @@ proptest! {
     #![proptest_config(cases(4096))]
 
     #[test]
-    fn an_approach_is_undone_by_its_inverse(approach in any_approach(), power in -30.0_f64..18.0) {
+    fn approach_has_an_inverse(approach in any_approach(), power in -30.0_f64..18.0) {
         let force_n = 10.0_f64.powf(power);
         let approach_mm = approach.approach_mm(force_n);
         let found = approach.force(approach_mm).unwrap();
         prop_assert!((found.force_n / force_n - 1.0).abs() < 1e-14, "{approach:?}, {force_n:e}, {:e}", found.force_n / force_n - 1.0);
-        // The exponent is the slope of the logarithms.
+        // The exponent is the slope in logarithms.
         let step = 1e-5_f64;
         let rise = (approach.approach_mm(force_n * (1.0 + step)) / approach.approach_mm(force_n * (1.0 - step))).ln() / (2.0 * step);
         prop_assert!((found.exponent - rise).abs() < 1e-8, "{} {rise}", found.exponent);
     }
 
     #[test]
-    fn springs_of_all_laws_share_any_torque_to_the_last_digits(springs in prop::collection::vec(any_spring(), 1..12), power in -12.0_f64..15.0) {
+    fn springs_of_all_laws_carry_torque_accurately(springs in prop::collection::vec(any_spring(), 1..12), power in -12.0_f64..15.0) {
         let torque_nmm = 1e3 * 10.0_f64.powf(power);
         let wind_up = Springs::new(&springs, 2.0).wind_up(torque_nmm).unwrap().unwrap();
         prop_assert!(wind_up.rotation.excess_rad >= 0.0);
@@ -278,7 +276,7 @@ proptest! {
         for spring in &springs {
             let force_n = spring.force_n(&wind_up.rotation).unwrap();
             torque += 2.0 * force_n * spring.static_arm_mm;
-            // Each carries exactly where its gap is closed.
+            // A spring carries exactly if its gap is closed.
             prop_assert!((force_n > 0.0) == (wind_up.rotation_rad() > spring.closing_rad) || (spring.closing_rad - wind_up.rotation_rad()).abs() < 1e-15 * spring.closing_rad);
         }
         prop_assert!((torque / torque_nmm - 1.0).abs() < 1e-13, "{:e}", torque / torque_nmm - 1.0);
@@ -287,7 +285,7 @@ proptest! {
     }
 }
 
-/// Springs of a few powers, whose arms decline to nothing somewhere within two radians.
+/// Generates springs of several power laws whose arms decline to zero within two radians.
 fn any_declining_spring() -> impl Strategy<Value = Spring> {
     let exponent = prop::sample::select(vec![1.0, 0.9, 2.0 / 3.0, 0.5]);
     let gap = prop::option::of(0.02_f64..0.5);
@@ -298,7 +296,7 @@ fn any_declining_spring() -> impl Strategy<Value = Spring> {
         } else {
             Approach::Power { exponent, coefficient, compliance_mm_per_n: 0.0 }
         };
-        // Where its arm ends a tooth has not gone any farther.
+        // The gap must close before the arm ends.
         let gap = gap.unwrap_or(0.0);
         let left_mm = travel_arm_mm * (1.0 - gap);
         Spring {
@@ -311,7 +309,8 @@ fn any_declining_spring() -> impl Strategy<Value = Spring> {
     })
 }
 
-/// The maxima of the torque up to that beyond which no spring has a gap left to close, in steps and then by thirds: rotations and torques.
+/// Returns rotations and torques of all maxima up to the first after all gaps are closed.
+/// It searches in steps, then by thirds.
 fn maxima(springs: &[Spring]) -> Vec<(f64, f64)> {
     let all = Springs::new(springs, 2.0);
     let at = |turned_rad: f64| Rotation { closing_rad: 0.0, excess_rad: turned_rad };
@@ -339,14 +338,14 @@ fn maxima(springs: &[Spring]) -> Vec<(f64, f64)> {
     maxima
 }
 
-/// Into so many the way up to the last gap is divided, and two radians beyond it.
+/// Number of steps over the rotation up to two radians past the last gap.
 const STEPS: u32 = 4000;
 
 proptest! {
     #![proptest_config(cases(512))]
 
     #[test]
-    fn springs_whose_arms_decline_carry_a_torque_where_they_first_make_it_and_none_above_their_highest_maximum(
+    fn declining_springs_carry_torque_up_to_their_maximum(
         springs in prop::collection::vec(any_declining_spring(), 1..5),
         share in 0.01_f64..1.0,
     ) {
@@ -356,7 +355,7 @@ proptest! {
         prop_assume!(most_nmm > 0.0);
         for share in [share, 0.95, 0.999] {
             let sought_nmm = share * most_nmm;
-            // Within rounding and steps of another maximum either may be found.
+            // Near another maximum, within rounding and steps, either may be found.
             if maxima.iter().any(|(_, torque_nmm)| (torque_nmm / sought_nmm - 1.0).abs() < 1e-4) {
                 continue;
             }
@@ -377,9 +376,9 @@ proptest! {
 proptest! {
     #![proptest_config(cases(256))]
 
-    /// By powers of two all numbers are the same but for their exponents.
+    /// Scaling by powers of two changes only exponents.
     #[test]
-    fn no_rotation_hangs_on_the_unit_of_length(springs in prop::collection::vec(any_declining_spring(), 1..5)) {
+    fn rotation_is_independent_of_unit_of_length(springs in prop::collection::vec(any_declining_spring(), 1..5)) {
         let torque_nmm = |step: u32| {
             let rotation = Rotation { closing_rad: 0.0, excess_rad: 0.02 * f64::from(step) };
             Springs::new(&springs, 2.0).torque_nmm(&rotation).unwrap().value
@@ -413,9 +412,9 @@ proptest! {
     }
 }
 
-/// Where a gap closes, a spring of Hertz's ellipse holds nothing yet, and the torque of those before falls on. That once was the end, and the load refused.
+/// A spring of Hertz's ellipse starts at zero force, so the torque of the others still falls for a moment.
 #[test]
-fn a_spring_that_closes_its_gap_while_the_torque_falls_carries_what_those_before_it_cannot() {
+fn closing_spring_carries_when_others_decline() {
     let spring = |arm_decline_mm_per_rad: f64, closing_rad: f64, approach: Approach| Spring {
         travel_arm_mm: 1.0 - arm_decline_mm_per_rad * closing_rad,
         static_arm_mm: 1.0 - arm_decline_mm_per_rad * closing_rad,
@@ -436,10 +435,9 @@ fn a_spring_that_closes_its_gap_while_the_torque_falls_carries_what_those_before
     assert!((both.torque_nmm(&rotation).unwrap().value / (1.5 * most_of_first_nmm) - 1.0).abs() < 1e-12);
 }
 
-/// The first one's torque is highest just beyond where the other closes. In search of less than that the whole way to the summit of both was once looked over at its ends, where
-/// the first alone makes less again, and what the summit makes was answered.
+/// The first spring's torque peaks just after the other closes. The search must not skip to the common maximum.
 #[test]
-fn a_torque_that_the_first_of_two_springs_makes_before_the_other_closes_is_carried_there() {
+fn torque_below_next_closing_is_carried_by_first() {
     let spring = |arm_mm: f64, end_rad: f64, closing_rad: f64, compliance_mm_per_n: f64| Spring {
         travel_arm_mm: arm_mm * (1.0 - closing_rad / end_rad),
         static_arm_mm: arm_mm * (1.0 - closing_rad / end_rad),
@@ -459,10 +457,9 @@ fn a_torque_that_the_first_of_two_springs_makes_before_the_other_closes_is_carri
     }
 }
 
-/// Both have closed their gaps when the first is passed. What the other would make farther on is on a branch that no load leads to. Arms shorter by a factor shorten
-/// all rotations by it.
+/// Beyond the first maximum lies a branch that no load reaches. Arms scaled by a factor scale all rotations.
 #[test]
-fn no_maximum_is_passed_at_which_all_gaps_are_closed_however_short_the_arms_are() {
+fn search_never_passes_a_maximum_of_all_springs() {
     for shorter in [1.0, 1e-6, 1e-12, 1e-18, 1e-24] {
         let spring = |end_rad: f64, compliance_mm_per_n: f64| Spring {
             travel_arm_mm: shorter * 5.0 * (1.0 - 0.1 / end_rad),
@@ -484,9 +481,9 @@ fn no_maximum_is_passed_at_which_all_gaps_are_closed_however_short_the_arms_are(
     }
 }
 
-/// By rounding, those before it may make less there by themselves.
+/// Rounding may let the other springs carry less at this point.
 #[test]
-fn a_torque_that_is_made_just_where_the_next_spring_closes_is_carried_there() {
+fn torque_at_next_closing_is_carried_there() {
     let spring = |arm_mm: f64, closing_rad: f64| Spring {
         travel_arm_mm: arm_mm,
         static_arm_mm: arm_mm,
@@ -504,9 +501,9 @@ fn a_torque_that_is_made_just_where_the_next_spring_closes_is_carried_there() {
     }
 }
 
-/// Rounding of the closing angles, 1e7 times what is turned beyond them, is all that parts two ways to these loads: no reason for an internal error.
+/// Closing angles are 1e7 times the rotation beyond them, so their rounding dominates. This is no internal error.
 #[test]
-fn next_to_no_torque_across_a_wide_gap_is_answered_with_the_digits_that_are_left() {
+fn tiny_torque_across_wide_gap_is_answered() {
     let parameters = DriveParameters {
         wave_generator: ellipse(16.75, 16.749_866_950_020_685),
         teeth: 424,

@@ -1,4 +1,4 @@
-//! Sweeps to a tolerance: what they promise, where teeth enter, and what they cost.
+//! Tolerance sweeps: their guarantees, the entry of teeth, and their cost.
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
@@ -15,7 +15,7 @@ use crate::drives::{
     semi_axes_mm, swept,
 };
 
-/// More than any of these sweeps takes.
+/// A limit above the need of these sweeps.
 const MAX_STATES: u64 = 10_000_000;
 
 fn swept_to(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> Sweep {
@@ -28,9 +28,10 @@ fn six_peaks(sweep: &Sweep) -> Vec<Peak> {
     sweep.peaks.iter().flat_map(|(_, peaks)| [peaks.force_n, peaks.stress_mpa]).collect()
 }
 
-/// Three lobes over 37 teeth take turns: of three laps that are alike one is worked out, and a lap's first moment is listed as the last of the one before.
+/// Three lobes over 37 teeth have three equal laps, and one is computed. A lap's first moment counts again as the last
+/// of the lap before.
 #[test]
-fn a_sweep_of_several_laps_is_refused_where_it_counts_one_state_more_than_allowed() {
+fn multi_lap_sweep_keeps_state_limit() {
     let wave_generator = WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 52.0, amplitude_mm: 1.0 };
     let p =
         DriveParameters { wave_generator, teeth: 37, installed: 37, ring_teeth: 34, tooth_radius_mm: 2.5, ..PAPER_5_1 };
@@ -47,9 +48,9 @@ fn a_sweep_of_several_laps_is_refused_where_it_counts_one_state_more_than_allowe
     assert!(matches!(refused, SolveError::TooManyStates { limit } if limit == counted - 1), "{refused:?}");
 }
 
-/// A period of case 5.1 ends where its seventh tooth enters, and carries nothing yet.
+/// A period of case 5.1 ends where its seventh tooth enters without load.
 #[test]
-fn a_sweep_to_a_tolerance_lists_no_input_angle_twice_where_teeth_enter_at_a_regular_tip() {
+fn tolerance_sweep_lists_no_regular_angle_twice() {
     let angles_deg = swept_to(&PAPER_5_1, &load(20.0, VirtualWork), 1e-3).input_angles.input_angle_deg;
     assert!(angles_deg.windows(2).all(|pair| pair[0] < pair[1]));
     assert_eq!([angles_deg[0], angles_deg[angles_deg.len() - 1]], [0.0, 360.0 / 26.0]);
@@ -57,7 +58,7 @@ fn a_sweep_to_a_tolerance_lists_no_input_angle_twice_where_teeth_enter_at_a_regu
 
 // --- Where a tooth enters
 
-/// The bore that ends the flank of a drive at so many spacings from the major axis, but for rounding.
+/// Returns the bore that ends the flank this many spacings from the major axis, up to rounding.
 fn bore_at(unbored: &Drive, spacings: u64) -> Option<f64> {
     let flank = unbored.flank();
     let position = Position::of_turn(spacings, unbored.parameters().installed.unsigned_abs(), 2)?;
@@ -65,12 +66,12 @@ fn bore_at(unbored: &Drive, spacings: u64) -> Option<f64> {
     Some(flank.radius_mm(&center, &flank.at(&center)))
 }
 
-/// The values up to four units in the last place around one.
+/// Returns the values up to four units in the last place around a value.
 fn around(value: f64) -> impl Iterator<Item = f64> {
     (value.to_bits() - 4..=value.to_bits() + 4).map(f64::from_bits)
 }
 
-/// That both ways to sweep a drive agree about its teeth and its loads.
+/// Asserts that both kinds of sweep agree about teeth and loads.
 fn assert_entry_is_decided_once(parameters: &DriveParameters) -> bool {
     let Ok(possible) = Drive::new(parameters) else { return false };
     let mesh = Mesh::new(&possible);
@@ -84,7 +85,7 @@ fn assert_entry_is_decided_once(parameters: &DriveParameters) -> bool {
         assert!(sweep.torque_balance_residual < 1e-12, "{:e} of {parameters:?}", sweep.torque_balance_residual);
         assert!(sweep.period_closure_residual < 1e-12, "{:e} of {parameters:?}", sweep.period_closure_residual);
         let (states, angles) = (sweep.states.len() as u64, sweep.input_angles.input_angle_deg.len() as u64);
-        // One fewer where a tooth leaves, and carries nothing, at the very instant before another enters.
+        // One fewer if an unloaded tooth leaves at the very instant before another enters.
         assert!((angles * teeth.min - 1..=angles * teeth.max).contains(&states), "{parameters:?}");
     }
     for (by_samples, to_tolerance) in six_peaks(&by_samples).iter().zip(six_peaks(&to_tolerance)) {
@@ -98,8 +99,8 @@ fn assert_entry_is_decided_once(parameters: &DriveParameters) -> bool {
 }
 
 #[test]
-fn a_bore_that_ends_the_flank_whole_spacings_from_the_major_axis_is_swept_alike_by_samples_and_to_a_tolerance() {
-    // Found in answers of 0.1: the wrong tooth stood at the end of the flank, and F_K was 3.6e18 N.
+fn bore_at_whole_spacings_is_swept_alike() {
+    // Found in 0.1: rounding put the wrong tooth at the end of the flank.
     let known = DriveParameters {
         wave_generator: ellipse(504.4784470731704, 498.60993196702196),
         teeth: 24,
@@ -119,7 +120,7 @@ proptest! {
     #![proptest_config(cases(300))]
 
     #[test]
-    fn bores_a_few_roundings_around_whole_spacings_are_swept_alike(parameters in any_drive(), share in 0.0_f64..1.0) {
+    fn bores_near_whole_spacings_are_swept_alike(parameters in any_drive(), share in 0.0_f64..1.0) {
         let unbored = DriveParameters { tip_radius_mm: None, ..parameters };
         let Ok(possible) = Drive::new(&unbored) else { return Ok(()) };
         let most = Mesh::new(&possible).teeth_in_mesh().min;
@@ -133,7 +134,7 @@ proptest! {
 }
 
 #[test]
-fn undercut_flanks_and_tips_a_few_roundings_around_whole_spacings_are_swept_alike() {
+fn flanks_near_whole_spacings_are_swept_alike() {
     let mut tried = 0;
     for teeth in [12_i64, 16, 20, 22, 28, 40] {
         for flattening in [0.005, 0.01, 0.015, 0.02, 0.027, 0.034, 0.05, 0.07] {
@@ -154,7 +155,7 @@ fn undercut_flanks_and_tips_a_few_roundings_around_whole_spacings_are_swept_alik
             for tooth_radius_mm in around(critical) {
                 tried += u32::from(assert_entry_is_decided_once(&of_radius(tooth_radius_mm)));
             }
-            // Thicker teeth end the flank earlier: halve for the radius at which it ends whole spacings from the major axis.
+            // Thicker teeth end the flank earlier. Bisection finds the radius with a flank end at whole spacings.
             let spacings =
                 |radius: f64| Drive::new(&of_radius(radius)).map(|drive| Mesh::new(&drive).engaged_spacings());
             let (mut thin, mut thick) = (critical * 1.001, critical * 1.5);
@@ -180,7 +181,7 @@ fn undercut_flanks_and_tips_a_few_roundings_around_whole_spacings_are_swept_alik
 struct Extremes {
     peaks: Vec<Peak>,
     half_widths_mm: Vec<f64>,
-    /// Wind-up and stiffness.
+    /// Largest wind-up and stiffness.
     most: [f64; 2],
     least: [f64; 2],
     transmission_error_deg: f64,
@@ -201,7 +202,7 @@ impl Extremes {
     }
 }
 
-/// Designs whose extremes stand at summits, at entries, at corners and at jumps of the stiffness.
+/// Returns designs with extremes at smooth maxima, entries, corners and jumps of the stiffness.
 pub(crate) fn designs() -> Vec<(DriveParameters, LoadParameters)> {
     let mut designs = Vec::new();
     let elliptic = DriveParameters {
@@ -234,7 +235,7 @@ pub(crate) fn designs() -> Vec<(DriveParameters, LoadParameters)> {
 }
 
 #[test]
-fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_half_widths() {
+fn tolerance_bounds_extremes_and_root_bounds_half_widths() {
     let mut worst = [0.0_f64; 5];
     for (parameters, load) in designs() {
         let dense = Extremes::of(&parameters, &swept(&parameters, &load, 6_000));
@@ -245,7 +246,7 @@ fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_h
                 assert!(missing <= allowed, "{kind}: {missing:e} of {allowed:e} at {context}");
                 worst[kind] = worst[kind].max(missing / allowed);
             };
-            // Whatever a sweep finds is a value that is taken on: it can miss an extreme, but not exceed it.
+            // A sweep finds real values, so it can miss an extreme but not exceed it.
             for (found, dense) in found.peaks.iter().zip(&dense.peaks) {
                 see(0, 1.0 - found.value / dense.value, tolerance);
             }
@@ -257,7 +258,7 @@ fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_h
             see(2, error_missed * drive(&parameters).teeth_per_wave(), tolerance * dense.most[0]);
             see(3, found.capacity_nm / dense.capacity_nm - 1.0, tolerance);
             for (found, dense) in found.half_widths_mm.iter().zip(&dense.half_widths_mm) {
-                // The dense sweep itself knows the place to a 6000th of the period.
+                // The dense sweep knows the position to 1/6000 of the period.
                 see(4, (found / dense - 1.0).abs(), tolerance.sqrt() + 1e-3);
             }
         }
@@ -266,7 +267,7 @@ fn a_tolerance_holds_for_peaks_wind_up_stiffness_and_capacity_and_its_root_for_h
 }
 
 #[test]
-fn a_finer_tolerance_moves_nothing_by_more_than_the_coarser_one_allows_at_corners_and_jumps_too() {
+fn finer_tolerance_stays_within_coarser_one() {
     for (parameters, load) in designs() {
         let finest = Extremes::of(&parameters, &swept_to(&parameters, &load, 1e-12));
         for tolerance in [1e-3, 1e-5, 1e-8] {
@@ -291,7 +292,7 @@ proptest! {
     #![proptest_config(cases(200))]
 
     #[test]
-    fn a_tolerance_holds_on_any_drive_with_any_gap(
+    fn tolerance_holds_on_any_drive_with_any_gap(
         parameters in any_swept_drive(),
         exponents in prop::array::uniform3(-1.0_f64..2.0),
         is_linear in any::<bool>(),
@@ -316,7 +317,7 @@ proptest! {
 }
 
 #[test]
-fn the_capacity_is_that_of_the_angle_where_it_is_least_and_not_of_those_where_loads_peak() {
+fn capacity_is_found_away_from_load_peaks() {
     let mut load = load(1.0, VirtualWork);
     load.clearance_um.ring = 10.0;
     load.allowable_stress_mpa = Some(everywhere(1500.0));
@@ -327,7 +328,7 @@ fn the_capacity_is_that_of_the_angle_where_it_is_least_and_not_of_those_where_lo
 }
 
 #[test]
-fn without_gaps_the_capacity_is_the_torque_by_the_rule_of_three_for_every_single_exponent() {
+fn gapless_capacity_grows_with_stress_squared() {
     for law in [ContactLaw::Linear, ContactLaw::Palmgren] {
         for parameters in [PAPER_5_1, PAPER_5_2] {
             let mut load = load(7.0, VirtualWork);
@@ -343,12 +344,12 @@ fn without_gaps_the_capacity_is_the_torque_by_the_rule_of_three_for_every_single
 
 // --- What it costs
 
-/// A drive of so many teeth, its radius this many times the critical one.
+/// Returns a drive with this many teeth and this multiple of the critical radius.
 pub(crate) fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
     let sin = (std::f64::consts::PI / teeth as f64).sin();
     let (a, ring) = (58.0, (teeth - 2) as f64 / 2.0);
     let tooth_radius_mm = 0.8 * a * sin / (1.0 - sin);
-    // k² (a² - b²) r_c = a²b, but for small terms.
+    // k² (a² - b²) r_c = a²b up to small terms.
     let stroke_mm = a * a / (2.0 * ring * ring * (tooth_radius_mm / of_critical));
     DriveParameters {
         wave_generator: ellipse(a, a - stroke_mm),
@@ -360,8 +361,8 @@ pub(crate) fn of_many_teeth(teeth: i64, of_critical: f64) -> DriveParameters {
     }
 }
 
-/// The fewest states with which a sweep is content.
-fn states_worked_out(parameters: &DriveParameters, tolerance: f64) -> u64 {
+/// Returns the least limit of states that a sweep accepts.
+fn least_state_limit(parameters: &DriveParameters, tolerance: f64) -> u64 {
     let (drive, load) = (drive(parameters), LoadCase::new(&load(20.0, Projection)).unwrap());
     let is_enough = |max_states| match sweep(&drive, &load, Points::tolerance(tolerance, max_states).unwrap(), &Never) {
         Ok(_) => true,
@@ -377,14 +378,14 @@ fn states_worked_out(parameters: &DriveParameters, tolerance: f64) -> u64 {
 }
 
 #[test]
-fn a_sweep_to_a_tolerance_works_out_a_number_of_states_that_grows_with_the_teeth_and_not_with_their_square() {
+fn tolerance_sweep_cost_is_linear_in_teeth() {
     for teeth in [28, 200, 1000, 1800, 10_000] {
         for of_critical in [0.7, 1.5] {
             let parameters = of_many_teeth(teeth, of_critical);
             let end = drive(&parameters).flank_limit().end;
             assert_eq!(end == FlankEnd::Undercut, of_critical > 1.0);
             let in_mesh = Mesh::new(&drive(&parameters)).teeth_in_mesh().max;
-            let states = states_worked_out(&parameters, 1e-4);
+            let states = least_state_limit(&parameters, 1e-4);
             println!(
                 "{teeth} teeth, {end:?}: {states} states worked out, {} times the teeth in mesh",
                 states / in_mesh

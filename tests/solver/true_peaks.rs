@@ -1,4 +1,4 @@
-//! True peaks alone, no column kept: what they promise, against dense samples, the sweep to a tolerance and the reference, and what they cost.
+//! True peaks without columns: guarantees against dense samples, tolerance sweeps and the reference, and their cost.
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
@@ -29,7 +29,7 @@ fn to(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> Sw
         .unwrap_or_else(|error| panic!("{error} of {parameters:?} {load:?}"))
 }
 
-/// Everything that has a largest value, by name; of what has a least value too, its reciprocal.
+/// Returns every largest value by name, and the reciprocal of every least value.
 fn extremes(peaks: &SweepPeaks) -> Vec<(&'static str, f64)> {
     let mut extremes = Vec::new();
     for (_, contact) in peaks.contacts.iter() {
@@ -46,7 +46,7 @@ fn extremes(peaks: &SweepPeaks) -> Vec<(&'static str, f64)> {
     extremes
 }
 
-/// That no extreme of so many intervals is missed by more than the tolerance.
+/// Asserts that no extreme of a dense sweep is missed by more than the tolerance.
 fn assert_found(parameters: &DriveParameters, load: &LoadParameters, samples: u64, tolerance: f64) {
     let dense = of(parameters, load, Points::samples(samples).unwrap()).unwrap();
     let found = to(parameters, load, tolerance);
@@ -67,13 +67,13 @@ fn by_every_law() -> Vec<(DriveParameters, LoadParameters)> {
 }
 
 #[test]
-fn no_dense_sweep_shows_more_than_true_peaks_by_more_than_their_tolerance() {
+fn no_dense_sweep_exceeds_true_peaks() {
     for (parameters, load) in by_every_law() {
         let Ok(dense) = of(&parameters, &load, Points::samples(20_000).unwrap()) else { continue };
         for tolerance in [1e-1, 1e-3, 1e-6, 1e-9, 1e-12] {
             let found = to(&parameters, &load, tolerance);
             for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
-                // Rounding alone parts the two by some units of the last digit.
+                // Rounding causes a difference of some units in the last digit.
                 let missing = 1.0 - found / dense;
                 assert!(
                     missing <= tolerance.max(1e-11),
@@ -93,23 +93,22 @@ fn no_dense_sweep_shows_more_than_true_peaks_by_more_than_their_tolerance() {
 }
 
 #[test]
-fn a_hundred_thousand_samples_show_no_more_and_hardly_less_than_true_peaks() {
+fn hundred_thousand_samples_approach_true_peaks() {
     for (parameters, load) in by_every_law().into_iter().step_by(7) {
         let Ok(dense) = of(&parameters, &load, Points::samples(100_000).unwrap()) else { continue };
         let found = to(&parameters, &load, 1e-9);
         for ((name, found), (_, dense)) in extremes(&found).into_iter().zip(extremes(&dense)) {
             assert!(found >= dense * (1.0 - 1e-9), "{name}: {found} {dense}");
-            // Loads, and with gaps the stiffness too, jump at some instant that samples miss by one interval.
+            // Loads, and with gaps the stiffness too, jump at an instant that samples miss by one interval.
             let is_stiffness = name.ends_with("stiffness");
             assert!(is_stiffness || found <= dense * (1.0 + 1e-3), "{name}: {found} {dense} {load:?} {parameters:?}");
         }
     }
 }
 
-/// A tooth that begins to carry under Johnson's law gives at first as if it were not there, and the loads of the others rise a little longer: here for
-/// 5e-5 degrees, by 1.6e-8.
+/// Under Johnson's law a tooth starts with zero stiffness, so other loads rise further: for 5e-5 degrees, by 1.6e-8.
 #[test]
-fn a_peak_just_after_another_tooth_begins_to_carry_is_found() {
+fn finds_peak_just_after_another_tooth_loads() {
     let clearance_um = PerContact { wave_generator: 0.0, ring: 3.0, carrier: 25.0 };
     let load = LoadParameters { law: JOHNSON, clearance_um, ..load(1.0, VirtualWork) };
     let dense = of(&PAPER_5_1, &load, Points::samples(2_000_000).unwrap()).unwrap();
@@ -119,10 +118,9 @@ fn a_peak_just_after_another_tooth_begins_to_carry_is_found() {
     }
 }
 
-/// On a wave generator that is nearly round many teeth carry, and one that stands in the valley has no arm: no rotation closes its gap there, and it begins
-/// to carry when it has left it.
+/// A tooth in the valley has no arm, so it starts to carry only after it has left the valley.
 #[test]
-fn a_stiffness_that_jumps_after_a_tooth_has_left_the_valley_is_found() {
+fn finds_stiffness_jump_near_valley() {
     let flat = |lobes: i64, mean_radius_mm, amplitude_mm, tooth_radius_mm| DriveParameters {
         wave_generator: WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm },
         teeth: 6 * lobes,
@@ -158,9 +156,9 @@ fn a_stiffness_that_jumps_after_a_tooth_has_left_the_valley_is_found() {
     }
 }
 
-/// At two of the first moments one tooth carries, between them another one alone, which is not pressed at either.
+/// One tooth carries at both of the first moments, another one only between them.
 #[test]
-fn a_tooth_that_carries_between_two_of_the_first_moments_alone_is_found() {
+fn finds_tooth_loaded_only_between_moments() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Eccentric {
             radius_mm: 3.916_351_596_676_902,
@@ -183,9 +181,9 @@ fn a_tooth_that_carries_between_two_of_the_first_moments_alone_is_found() {
     assert_found(&parameters, &load, 1500, 1e-4);
 }
 
-/// There a gap has a corner.
+/// The gap has a corner there.
 #[test]
-fn a_peak_where_a_tooth_comes_to_the_relief_is_found() {
+fn finds_peak_where_tooth_reaches_relief() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Harmonic { lobes: 3, mean_radius_mm: 48.0, amplitude_mm: 1.0 },
         teeth: 30,
@@ -204,9 +202,9 @@ fn a_peak_where_a_tooth_comes_to_the_relief_is_found() {
     assert_found(&parameters, &load, 6007, 1e-5);
 }
 
-/// Where corners bend both ways within two stretches their second differences take each other away.
+/// Second differences of two opposite corners cancel.
 #[test]
-fn a_capacity_between_two_corners_is_found() {
+fn finds_capacity_between_two_corners() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::Harmonic {
             lobes: 5,
@@ -233,10 +231,9 @@ fn a_capacity_between_two_corners_is_found() {
     assert!(found_nm <= dense_nm * (1.0 + 1e-4), "{found_nm} {dense_nm}");
 }
 
-/// Next to no torque across a gap of 100 mm: what bends the capacity's curve is rounding, and what bends the loads' as well where the wave generator is
-/// nearly round.
+/// Under a tiny torque across a gap of 100 mm, rounding bends the curves of capacity and loads.
 #[test]
-fn extremes_that_rounding_alone_bends_are_found() {
+fn finds_extremes_despite_rounding() {
     let cylinder = |width_mm| ToothShape::Cylinder { width_mm };
     let of_major = |semi_major_mm, semi_minor_mm, teeth, installed, tooth_radius_mm, width_mm| DriveParameters {
         wave_generator: ellipse(semi_major_mm, semi_minor_mm),
@@ -264,10 +261,9 @@ fn extremes_that_rounding_alone_bends_are_found() {
     }
 }
 
-/// Stiff contacts under next to no torque: each tooth carries alone, and hands over within a hundred-millionth of the period. Beside that instant the one that
-/// carries is hardly pressed, and the one that does not stands open by thousands of times as much.
+/// With stiff contacts each tooth carries alone, and the transfer takes less than 1e-8 of the period.
 #[test]
-fn a_load_that_changes_hands_at_once_is_closed_in_on() {
+fn finds_sudden_load_transfer() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::HarmonicPath {
             lobes: 3,
@@ -306,9 +302,9 @@ fn a_load_that_changes_hands_at_once_is_closed_in_on() {
     assert!(found_nm <= dense_nm * (1.0 + 1e-8), "{found_nm} {dense_nm}");
 }
 
-/// A gap, one lobe and teeth softer than the parts: the capacity has more corners in a period than there are rounds for one after the other.
+/// The capacity has more corners in a period than there are rounds, so one round must find several.
 #[test]
-fn many_corners_of_a_capacity_are_found_to_the_tightest_tolerance() {
+fn finds_many_capacity_corners_at_tightest_tolerance() {
     let parameters = DriveParameters {
         wave_generator: WaveGenerator::HarmonicPath {
             lobes: 1,
@@ -346,7 +342,7 @@ fn many_corners_of_a_capacity_are_found_to_the_tightest_tolerance() {
 
 /// `ψ_i = 2π i/Z'_G - j Z_K/Z_G`.
 #[test]
-fn the_tooth_of_a_true_peak_stands_where_its_input_angle_puts_it() {
+fn true_peak_tooth_position_matches_its_input_angle() {
     for p in [PAPER_5_1, PAPER_5_2] {
         for (_, peaks) in to(&p, &load(20.0, VirtualWork), 1e-4).contacts.iter() {
             for peak in [peaks.force_n, peaks.stress_mpa] {
@@ -359,7 +355,7 @@ fn the_tooth_of_a_true_peak_stands_where_its_input_angle_puts_it() {
 }
 
 #[test]
-fn true_peaks_are_those_of_the_sweep_to_a_tolerance() {
+fn true_peaks_match_tolerance_sweep() {
     for (parameters, load) in by_every_law() {
         let case = LoadCase::new(&load).unwrap();
         let points = Points::tolerance(1e-10, MAX_STATES).unwrap();
@@ -383,7 +379,7 @@ fn true_peaks_are_those_of_the_sweep_to_a_tolerance() {
 }
 
 #[test]
-fn true_peaks_of_unlike_zones_are_those_of_all_their_teeth() {
+fn true_peaks_cover_all_teeth_of_unlike_zones() {
     for (installed, lobes) in [(29, 2), (31, 3), (33, 6)] {
         let wave_generator = WaveGenerator::HarmonicPath { lobes, mean_path_radius_mm: 60.0, amplitude_mm: 0.8 };
         let parameters = DriveParameters {
@@ -413,7 +409,7 @@ proptest! {
     #![proptest_config(cases(600))]
 
     #[test]
-    fn no_samples_of_any_drive_under_any_law_show_more_than_true_peaks(
+    fn no_samples_under_any_law_exceed_true_peaks(
         parameters in prop_oneof![2 => any_swept_drive(), 1 => any_drive_of_other_kinds(), 1 => any_drive_of_unlike_zones()],
         teeth in prop::option::weighted(0.4, any_other_teeth()),
         gaps in prop::option::of(prop::array::uniform3(-1.0_f64..2.0)),
@@ -437,7 +433,7 @@ proptest! {
 }
 
 #[test]
-fn true_peaks_are_those_of_the_reference() {
+fn true_peaks_match_the_reference() {
     let mut worst = Worst::default();
     for case in crate::extremes::cases("extremes") {
         let (name, points) = (case.name(), case.points());
@@ -460,8 +456,8 @@ fn true_peaks_are_those_of_the_reference() {
 
 // --- What they cost
 
-/// The fewest states with which they are found.
-fn states_worked_out(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> u64 {
+/// Returns the least limit of states that the search accepts.
+fn least_state_limit(parameters: &DriveParameters, load: &LoadParameters, tolerance: f64) -> u64 {
     let is_enough = |max_states| match of(parameters, load, Points::tolerance(tolerance, max_states).unwrap()) {
         Ok(_) => true,
         Err(SolveError::TooManyStates { .. }) => false,
@@ -476,7 +472,7 @@ fn states_worked_out(parameters: &DriveParameters, load: &LoadParameters, tolera
 }
 
 #[test]
-fn true_peaks_take_some_hundred_states_of_the_papers_cases_and_at_the_threshold_of_undercut() {
+fn true_peaks_need_some_hundred_states() {
     let threshold = DriveParameters { tooth_radius_mm: 6.749_189_868_666_484 * (1.0 + 1e-6), ..PAPER_5_1 };
     let with_gaps = |law| {
         let clearance_um = PerContact { wave_generator: 0.0, ring: 10.0, carrier: 2.0 };
@@ -494,19 +490,19 @@ fn true_peaks_take_some_hundred_states_of_the_papers_cases_and_at_the_threshold_
         ("5.2 johnson", PAPER_5_2, without(JOHNSON), 230),
         ("threshold", threshold, linear, 350),
     ] {
-        let states = states_worked_out(&parameters, &load, 1e-9);
+        let states = least_state_limit(&parameters, &load, 1e-9);
         println!("{name}: {states} states");
         assert!(states <= most, "{name}: {states} states");
     }
 }
 
 #[test]
-fn true_peaks_cost_as_much_as_there_are_teeth() {
+fn true_peaks_cost_is_linear_in_teeth() {
     for of_critical in [0.7, 1.5] {
         for teeth in [28, 200, 1000, 10_000] {
             let parameters = of_many_teeth(teeth, of_critical);
             let in_mesh = Mesh::new(&drive(&parameters)).teeth_in_mesh().max;
-            let states = states_worked_out(&parameters, &load(20.0, Projection), 1e-6);
+            let states = least_state_limit(&parameters, &load(20.0, Projection), 1e-6);
             println!(
                 "{teeth} teeth, {of_critical} of the critical radius: {} times the teeth in mesh",
                 states / in_mesh

@@ -1,4 +1,5 @@
-//! Where the wind-up without load is least and largest, found by a sweep to a tolerance: against dense positions, of a calculation of its own where that knows the gaps.
+//! Extremes of the unloaded wind-up from tolerance sweeps, against dense positions. An independent calculation is used
+//! where it knows the gaps.
 
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::VirtualWork;
@@ -21,7 +22,7 @@ fn to(tolerance: f64) -> Points {
     Points::tolerance(tolerance, MAX_STATES).unwrap().also_without_load()
 }
 
-/// Input angles of a sweep, and the wind-up without load there.
+/// Returns a sweep's input angles and its unloaded wind-up.
 fn without_load(
     p: &DriveParameters,
     load: &LoadParameters,
@@ -38,7 +39,7 @@ fn extremes(p: &DriveParameters, load: &LoadParameters, points: Points) -> Extre
     Extremes::of(&without_load(p, load, &Deviations::default(), points).1)
 }
 
-/// That what was found misses nothing of what is dense beyond the tolerance. It is taken on somewhere, and so exceeds nothing.
+/// Asserts that the extremes miss the dense ones by at most the tolerance. Found values exist, so they exceed nothing.
 fn assert_found(found: &Extremes, dense: &Extremes, tolerance: f64, what: &str) {
     let least_missed = found.least - dense.least;
     let largest_missed = dense.largest - found.largest;
@@ -48,7 +49,7 @@ fn assert_found(found: &Extremes, dense: &Extremes, tolerance: f64, what: &str) 
 }
 
 #[test]
-fn case_5_1_without_load_errs_by_what_the_closing_angles_of_its_teeth_range_over() {
+fn unloaded_error_of_case_5_1_is_known() {
     let load = LoadParameters { clearance_um: AT_RING, ..load(20.0, VirtualWork) };
     let period_rad = (360.0_f64 / 26.0).to_radians();
     let dense: Vec<_> = (0..5000)
@@ -65,7 +66,7 @@ fn case_5_1_without_load_errs_by_what_the_closing_angles_of_its_teeth_range_over
 }
 
 #[test]
-fn with_deviations_no_position_is_missed() {
+fn no_position_is_missed_with_deviations() {
     for (index, p) in drives().iter().enumerate() {
         let drive = drive(p);
         for kinds in &ALL_KINDS[..3] {
@@ -85,7 +86,7 @@ fn with_deviations_no_position_is_missed() {
                 let (angles_deg, unloaded_deg) = without_load(p, &load, &deviations, to(tolerance));
                 let found = Extremes::of(&unloaded_deg);
                 assert_found(&found, &dense, tolerance, &format!("{kinds:?} {p:?}"));
-                // What is least is least there; what is largest may stand where a tooth enters.
+                // The minimum occurs at its own angle. The maximum may be at a tooth's entry.
                 let (angle_deg, _) = angles_deg
                     .iter()
                     .zip(&unloaded_deg)
@@ -110,7 +111,7 @@ fn of(wave_generator: WaveGenerator, teeth: i64, ring_teeth: i64, tooth_radius_m
     }
 }
 
-/// Regular, undercut and bored flanks, zones unlike, one lobe and three, few teeth.
+/// Returns regular, undercut and bored flanks, unlike zones, one and three lobes, and few teeth.
 fn shapes() -> Vec<DriveParameters> {
     vec![
         PAPER_5_1,
@@ -145,7 +146,7 @@ fn loads(end_deg: f64) -> Vec<LoadParameters> {
         LoadParameters { modification: shifted, ..of_gaps(AT_RING) },
         LoadParameters { modification: relieved(2.0, 0.3), ..of_gaps(everywhere(3.0)) },
         LoadParameters { modification: relieved(1.0, 0.5), ..of_gaps(AT_RING) },
-        // Nothing is open before the relief begins.
+        // No gap is open before the relief begins.
         LoadParameters { modification: relieved(2.0, 0.2), ..of_gaps(PerContact::default()) },
         LoadParameters { wave_generator_moves: true, ..of_gaps(AT_RING) },
         LoadParameters { corner_contact: true, ..of_gaps(AT_RING) },
@@ -154,7 +155,7 @@ fn loads(end_deg: f64) -> Vec<LoadParameters> {
 }
 
 #[test]
-fn of_any_gap_and_shape_no_dense_sweep_shows_more() {
+fn tolerance_finds_unloaded_extremes_for_every_shape() {
     for p in shapes() {
         for load in loads(drive(&p).flank_limit().position.from_lobe_deg()) {
             let what = format!("{load:?} {p:?}");
@@ -172,7 +173,7 @@ proptest! {
     #![proptest_config(cases(100))]
 
     #[test]
-    fn on_any_drive_with_any_gap_no_dense_sweep_shows_more(
+    fn tolerance_finds_unloaded_extremes_on_any_drive(
         parameters in any_swept_drive(),
         exponents in prop::array::uniform3(-1.0_f64..2.0),
         is_at_slot_alone in any::<bool>(),
@@ -184,7 +185,7 @@ proptest! {
         let clearance_um = if is_at_slot_alone { PerContact { carrier, ..PerContact::default() } } else { of_all };
         let load = LoadParameters { clearance_um, wave_generator_moves: moves, ..load(20.0, VirtualWork) };
         let case = LoadCase::new(&load).unwrap();
-        // A wave generator that moves may turn past its teeth.
+        // A moving wave generator may turn past its teeth.
         let drive = drive(&parameters);
         if let Ok(dense) = sweep::sweep(&drive, &case, Points::samples(1500).unwrap(), &Never) {
             let dense_deg = sweep::unloaded_wind_up_deg(&drive, &case, &Deviations::default(), &dense, &Never).unwrap();
@@ -195,7 +196,7 @@ proptest! {
 }
 
 #[test]
-fn a_sweep_that_is_asked_of_the_wind_up_without_load_has_two_more_input_angles_and_the_same_peaks() {
+fn unloaded_wind_up_adds_only_two_input_angles() {
     let load = LoadParameters { clearance_um: AT_RING, ..load(20.0, VirtualWork) };
     let drive = drive(&PAPER_5_1);
     let swept = |points| swept_with(&drive, &load, &Deviations::default(), points).unwrap();
@@ -207,7 +208,7 @@ fn a_sweep_that_is_asked_of_the_wind_up_without_load_has_two_more_input_angles_a
         assert!((found.force_n.value / peaks.force_n.value - 1.0).abs() < 1e-6);
         assert!((found.stress_mpa.value / peaks.stress_mpa.value - 1.0).abs() < 1e-6);
     }
-    // Equal intervals stay what they are.
+    // Sweeps by samples do not change.
     let points = Points::samples(50).unwrap();
     assert_eq!(swept(points).states, swept(points.also_without_load()).states);
 }

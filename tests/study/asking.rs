@@ -1,4 +1,4 @@
-//! Ways to carry out a study.
+//! Functions that run a study.
 
 use std::sync::Arc;
 
@@ -18,14 +18,14 @@ pub(crate) fn study(document: &Value) -> Result<Arc<Study>, NoAnswer> {
     Study::read(document.to_string().as_bytes(), &LIMITS).map(Arc::new)
 }
 
-/// Where a document is at fault, and how.
+/// Returns pointer and code of a document's fault.
 pub(crate) fn faulty(document: &Value) -> (String, String) {
     let refused = study(document).expect_err("the study can be carried out");
     let error = refused.errors.first().unwrap_or_else(|| panic!("{refused}"));
     (error.pointer.clone(), toothwave_calculation::json::word(&error.code))
 }
 
-/// What a study comes to, its chunks one after the other.
+/// Runs a study, one chunk after the other.
 pub(crate) fn gathered(document: &Value) -> Gathered {
     let study = study(document).unwrap_or_else(|refused| panic!("{refused}"));
     let mut gathered = Gathered::new(&study);
@@ -45,7 +45,7 @@ pub(crate) fn answer(document: &Value) -> Value {
     serde_json::from_str(&text(&gathered(document), Format::Json)).unwrap()
 }
 
-/// Case 5.1 of the paper, by its own model, which is the fastest.
+/// Returns the paper's case 5.1 under the paper's model, which is the fastest.
 pub(crate) fn paper() -> Value {
     json!({
         "model": { "compatibility": "projection", "stiffness": { "law": "linear" } },
@@ -58,7 +58,7 @@ pub(crate) fn paper() -> Value {
     })
 }
 
-/// The document with the field set; the object or array that holds it is there already.
+/// Returns the document with a field set. Its parent must exist.
 pub(crate) fn with(document: &Value, pointer: &str, value: Value) -> Value {
     let mut document = document.clone();
     let (parent, name) = pointer.rsplit_once('/').unwrap();

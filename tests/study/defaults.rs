@@ -1,6 +1,6 @@
-//! What a default that is written out, and the sweep beside a study, must not change.
+//! Defaults written out, and consistency of studies with sweeps.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use toothwave_calculation::design::Design;
 use toothwave_calculation::question::Question as _;
 use toothwave_calculation::sweep::Sweep;
@@ -17,7 +17,7 @@ fn examples() -> [Value; 3] {
     .map(|text| serde_json::from_str(text).unwrap())
 }
 
-/// All kinds of study of a base, over a number that defaults follow from.
+/// Returns all kinds of studies over a number on which defaults depend.
 fn studies(base: &Value) -> Vec<Value> {
     let radius_mm = base["drive"]["teeth"]["radius_mm"].as_f64().unwrap();
     let range = json!({ "min": 0.9 * radius_mm, "max": radius_mm });
@@ -31,7 +31,7 @@ fn studies(base: &Value) -> Vec<Value> {
 }
 
 #[test]
-fn a_default_written_out_keeps_the_id() {
+fn explicit_default_keeps_the_id() {
     for base in examples() {
         let design = Design::read(base.to_string().as_bytes()).unwrap();
         let mut whole = serde_json::to_value(&design).unwrap();
@@ -47,7 +47,28 @@ fn a_default_written_out_keeps_the_id() {
 }
 
 #[test]
-fn what_is_no_default_changes_the_id() {
+fn inputs_written_out_keep_the_id() {
+    for base in examples() {
+        let whole = serde_json::to_value(Design::read(base.to_string().as_bytes()).unwrap()).unwrap();
+        let short = json!({ "study": "sensitivity", "base": base });
+        let found = answer(&short);
+        let inputs = found["quantities"][0]["inputs"].as_array().unwrap();
+        let inputs: Map<_, _> = inputs
+            .iter()
+            .map(|input| (input["pointer"].as_str().unwrap().to_owned(), json!({ "relative": 0.01 })))
+            .collect();
+        let ids = [
+            short,
+            json!({ "study": "sensitivity", "base": whole }),
+            json!({ "study": "sensitivity", "base": whole, "inputs": inputs }),
+        ]
+        .map(|document| study(&document).unwrap().id());
+        assert_eq!([ids[0]; 3], ids, "{base}");
+    }
+}
+
+#[test]
+fn non_default_value_changes_the_id() {
     let [base, ..] = examples();
     for (pointer, value) in [
         ("/model/refinements", json!("none")),
@@ -63,7 +84,7 @@ fn what_is_no_default_changes_the_id() {
 }
 
 #[test]
-fn a_study_has_the_loss_of_its_sweep() {
+fn study_has_the_losses_of_its_sweep() {
     let base = json!({
         "drive": {
             "wave_generator": { "kind": "harmonic", "lobes": 2, "mean_radius_mm": 231.12997975753026, "amplitude_mm": 41.60339635635545 },

@@ -1,4 +1,4 @@
-//! The engine: chunks are pure, and merged in any order to the same bits.
+//! The engine: chunks are pure, and merging in any order gives the same bits.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -11,7 +11,7 @@ use toothwave_study::{Gathered, Part, Study, Work};
 
 use crate::asking::{LIMITS, gathered, paper, study, text, with};
 
-/// A study of each kind, each of several chunks.
+/// Returns a study of each kind with several chunks each.
 fn studies() -> [Value; 4] {
     let radius = |steps: u64| json!({ "min": 3.0, "max": 7.5, "steps": steps });
     let normal = json!({ "distribution": "normal", "sigma": 0.01, "limit": 0.03 });
@@ -38,13 +38,13 @@ fn in_chunks_of(document: &Value, variants: u64) -> Arc<Study> {
     Arc::new(Study::read(document.to_string().as_bytes(), &LIMITS).unwrap().in_chunks_of(variants))
 }
 
-/// A part as a store would keep it.
+/// Returns a part after a round trip through the store.
 fn kept(part: &Part) -> Part {
     serde_json::from_str(&serde_json::to_string(part).unwrap()).unwrap()
 }
 
 #[test]
-fn chunks_in_any_order_give_the_same_bits() {
+fn chunks_in_any_order_give_same_bits() {
     for document in studies() {
         let one_thread = text(&gathered(&document), Format::Json);
         let study = study(&document).unwrap();
@@ -55,7 +55,7 @@ fn chunks_in_any_order_give_the_same_bits() {
             chunks.into_par_iter().for_each(|chunk| {
                 let part = kept(&Work::new(&study, chunk).run(&Never).unwrap());
                 several.lock().unwrap().add(chunk, part.clone());
-                // A second time it changes nothing.
+                // Adding a part twice changes nothing.
                 several.lock().unwrap().add(chunk, part);
             });
         });
@@ -65,7 +65,7 @@ fn chunks_in_any_order_give_the_same_bits() {
     }
 }
 
-/// Stops when it is asked a certain time.
+/// A stop flag that the test sets.
 struct Times {
     is_set: AtomicBool,
 }
@@ -77,7 +77,7 @@ impl Stop for Times {
 }
 
 #[test]
-fn a_chunk_that_is_stopped_and_taken_up_again_has_the_same_bits() {
+fn resumed_chunk_has_same_bits() {
     for document in studies() {
         let study = in_chunks_of(&document, 100);
         let whole = Work::new(&study, 0).run(&Never).unwrap();
@@ -86,7 +86,7 @@ fn a_chunk_that_is_stopped_and_taken_up_again_has_the_same_bits() {
         let mut stopped = 0;
         let mut steps = 0_u32;
         loop {
-            // Every third time it is told to stop while it works on a variant.
+            // Every third step is stopped while it works on a variant.
             steps += 1;
             stop.is_set.store(steps.is_multiple_of(3), Ordering::Relaxed);
             match work.step(&stop) {
@@ -100,9 +100,9 @@ fn a_chunk_that_is_stopped_and_taken_up_again_has_the_same_bits() {
     }
 }
 
-/// Of each quantity an entry for each input or kind of deviation, with its name: nine times what was counted.
+/// Each quantity has an entry with a name for each input or kind of deviation.
 #[test]
-fn what_the_answer_of_a_study_of_many_inputs_takes_is_known_before_it_is_made() {
+fn answer_size_of_many_inputs_is_known_beforehand() {
     let inputs = |what: &Value| (0..26).map(|i| (format!("/deviations/ring_space_um/{i}"), what.clone())).collect();
     let base = with(&paper(), "/deviations", json!({ "ring_space_um": vec![0.0; 26] }));
     let base = with(&base, "/model", json!({ "clearance": { "ring_um": 9.0 } }));
@@ -116,14 +116,14 @@ fn what_the_answer_of_a_study_of_many_inputs_takes_is_known_before_it_is_made() 
         let study = study(&document).unwrap();
         let mut text = Vec::new();
         gathered(&document).answer().write(Format::Json, &mut text).unwrap();
-        // Names and numbers take about as much as their text.
+        // Names and numbers take about the size of their text.
         let (told, text) = (study.told_bytes(), text.len() as u64);
         assert!((text / 2..4 * text).contains(&told), "{told} for {text} of text: {}", document["study"]);
     }
 }
 
 #[test]
-fn a_study_that_is_half_done_tells_what_it_has() {
+fn half_done_study_reports_what_it_has() {
     let [map, search, ..] = studies();
     for document in [map, search] {
         let study = in_chunks_of(&document, 100);
@@ -152,7 +152,7 @@ fn another_seed_is_another_study() {
 }
 
 #[test]
-fn a_study_in_chunks_of_any_size_has_the_same_bits() {
+fn study_in_any_chunk_size_has_same_bits() {
     for document in studies() {
         let whole = text(&gathered(&document), Format::Json);
         for variants in [1, 7, 1_000_000] {
@@ -167,7 +167,7 @@ fn a_study_in_chunks_of_any_size_has_the_same_bits() {
 }
 
 #[test]
-fn a_variant_alone_is_what_it_is_among_the_others() {
+fn variant_alone_equals_variant_among_others() {
     let [map, _, sensitivity, tolerance] = studies();
     for document in [map, sensitivity, tolerance] {
         let study = in_chunks_of(&document, 1);
@@ -182,7 +182,7 @@ fn a_variant_alone_is_what_it_is_among_the_others() {
 }
 
 #[test]
-fn chunks_follow_from_the_number_of_variants() {
+fn chunks_follow_from_number_of_variants() {
     let chunks = |steps: u64| {
         let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": steps } });
         let map = json!({ "study": "map", "base": paper(), "over": over, "quantities": ["undercut"] });

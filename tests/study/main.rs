@@ -1,4 +1,4 @@
-//! What is true of studies.
+//! Tests of studies.
 #![allow(
     clippy::float_cmp,
     clippy::unwrap_used,

@@ -19,7 +19,7 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn a_map_answers_each_variant_as_its_own_document_is_answered() {
+fn map_answers_each_variant_as_its_document() {
     let over = json!({
         "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 5 },
         "/load/input_torque_nm": { "min": 10.0, "max": 20.0, "steps": 2 }
@@ -40,7 +40,7 @@ fn a_map_answers_each_variant_as_its_own_document_is_answered() {
 }
 
 #[test]
-fn impossible_variants_are_counted_under_their_reason_and_have_no_numbers() {
+fn impossible_variants_are_counted_by_reason() {
     let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 9.0, "steps": 7 } });
     let found = answer(&map(over, json!(["slot_wall_mm"])));
     assert_eq!(found["possible"]["variant"], json!([0, 1, 2, 3, 4]));
@@ -50,9 +50,9 @@ fn impossible_variants_are_counted_under_their_reason_and_have_no_numbers() {
     assert_eq!((&reason["variants"], &reason["first_variant"]), (&json!(2), &json!(5)));
 }
 
-/// As its drawing is: the outer radius of a ring that has its root at 68 mm.
+/// The root of the drawn ring is at 68 mm.
 #[test]
-fn a_ring_that_is_smaller_than_its_root_has_no_outer_diameter() {
+fn ring_inside_its_root_has_no_outer_diameter() {
     let over = json!({ "/parts/ring/outer_radius_mm": { "min": 66.0, "max": 72.0, "steps": 4 } });
     let found = answer(&map(over.clone(), json!(["outer_diameter_mm", "coincidence_degree"])));
     assert_eq!(numbers(&found["possible"]["quantities"]["outer_diameter_mm"]), [140.0, 144.0]);
@@ -61,14 +61,13 @@ fn a_ring_that_is_smaller_than_its_root_has_no_outer_diameter() {
         (&reason["code"], &reason["pointer"]),
         (&json!("ring_without_rim"), &json!("/parts/ring/outer_radius_mm"))
     );
-    // As in answers without drawings, what nobody asks for is no reason.
+    // As in answers without drawings, an unrequested quantity gives no reason.
     let found = answer(&map(over, json!(["coincidence_degree"])));
     assert_eq!(found["possible"]["variant"], json!([0, 1, 2, 3]));
 }
 
-/// It was told as a fault of the service: twice the radius is no number.
 #[test]
-fn an_outer_radius_out_of_its_range_is_the_reason_why_there_is_no_outer_diameter() {
+fn outer_radius_out_of_range_is_the_reason() {
     let over = json!({ "/parts/ring/outer_radius_mm": { "one_of": [72.0, 1e308] } });
     let found = answer(&map(over, json!(["outer_diameter_mm"])));
     assert_eq!(numbers(&found["possible"]["quantities"]["outer_diameter_mm"]), [144.0]);
@@ -81,17 +80,17 @@ fn an_outer_radius_out_of_its_range_is_the_reason_why_there_is_no_outer_diameter
 }
 
 #[test]
-fn every_whole_number_of_a_range_is_a_step_of_its_own() {
+fn every_whole_number_of_range_is_a_step() {
     let base = with(&paper(), "/drive/ring", json!({}));
     let study = json!({ "study": "map", "base": base, "over": { "/drive/teeth/count": { "min": 19.5, "max": 24 } }, "quantities": ["transmission_ratio"] });
     let found = answer(&study);
     assert_eq!(numbers(&found["over"][0]["values"]), [20.0, 21.0, 22.0, 23.0, 24.0]);
-    // The ring has a tooth fewer for each of the two lobes where nothing is said.
+    // By default the ring has one tooth fewer for each of the two lobes.
     assert_eq!(numbers(&found["possible"]["quantities"]["transmission_ratio"]), [10.0, 10.5, 11.0, 11.5, 12.0]);
 }
 
 #[test]
-fn fields_that_a_kind_does_not_take_are_left_out_of_it() {
+fn fields_of_other_kinds_are_left_out() {
     let base = with(&paper(), "/drive/wave_generator/lobes", json!(2));
     let base = with(&base, "/drive/wave_generator/mean_radius_mm", json!(57.0));
     let base = with(&base, "/drive/wave_generator/amplitude_mm", json!(1.0));
@@ -99,13 +98,13 @@ fn fields_that_a_kind_does_not_take_are_left_out_of_it() {
     let found = answer(&json!({ "study": "map", "base": base, "over": over, "quantities": ["ring_root_radius_mm"] }));
     assert_eq!(found["over"][0]["choices"], json!(["ellipse", "harmonic"]));
     assert_eq!(numbers(&found["possible"]["quantities"]["ring_root_radius_mm"]), [68.0, 68.0]);
-    // Without a choice a field too many stays a fault.
+    // Without a choice, an additional field is a fault.
     let study = json!({ "study": "map", "base": base, "over": { "/drive/teeth/radius_mm": { "min": 4, "max": 5, "steps": 2 } } });
     assert_eq!(faulty(&study), ("/base/drive/wave_generator/amplitude_mm".into(), "unknown_field".into()));
 }
 
 #[test]
-fn outer_diameters_are_those_of_the_ring_as_drawn() {
+fn outer_diameters_match_drawn_ring() {
     let over = json!({ "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0, "steps": 2 } });
     let found = answer(&map(over.clone(), json!(["outer_diameter_mm"])));
     assert_eq!(numbers(&found["possible"]["quantities"]["outer_diameter_mm"]), [2.4 * 66.0, 2.4 * 68.0]);
@@ -115,7 +114,7 @@ fn outer_diameters_are_those_of_the_ring_as_drawn() {
 }
 
 #[test]
-fn the_lines_of_a_map_are_its_variants() {
+fn lines_of_map_are_its_variants() {
     let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 9.0, "steps": 4 } });
     let csv = text(&gathered(&map(over, json!(["undercut"]))), Format::Csv);
     let expected = "variant,/drive/teeth/radius_mm,undercut,reason\n0,3.0,0.0,\n1,5.0,0.0,\n2,7.0,,teeth_touch\n3,9.0,,teeth_touch\n";
@@ -123,7 +122,7 @@ fn the_lines_of_a_map_are_its_variants() {
 }
 
 #[test]
-fn what_cannot_be_mapped_is_said_at_its_field() {
+fn impossible_map_is_refused_at_its_field() {
     let of = |over: Value| map(json!({ "/drive/teeth/radius_mm": over }), json!([]));
     for (over, field, code) in [
         (json!({ "min": 5.0, "max": 3.0, "steps": 2 }), "/min", "out_of_range"),
@@ -132,7 +131,7 @@ fn what_cannot_be_mapped_is_said_at_its_field() {
         (json!({ "min": 3.0, "steps": 2 }), "", "missing_field"),
         (json!({ "min": 3.0, "max": 5.0, "one_of": [3.0] }), "", "conflicting_fields"),
         (json!({ "one_of": [] }), "/one_of", "out_of_range"),
-        // Its values were infinite, and none at all.
+        // The values would be infinite or not a number.
         (json!({ "min": -1e308, "max": 1e308, "steps": 3 }), "", "out_of_range"),
         (json!({ "min": null, "max": 5.0 }), "/min", "wrong_type"),
     ] {
@@ -153,9 +152,9 @@ fn what_cannot_be_mapped_is_said_at_its_field() {
     assert_eq!(faulty(&capacity), ("/base/load/allowable_stress_mpa".into(), "missing_field".into()));
 }
 
-/// A typo beside a choice was left out as what another kind has, and the default taken in its place: other stresses, and no word of it.
+/// A typo must not be taken for a field of another kind and replaced by a default.
 #[test]
-fn a_field_of_the_base_that_no_variant_knows_is_refused_and_not_left_out() {
+fn unknown_field_of_base_is_refused() {
     let radii = || json!({ "/drive/teeth/radius_mm": { "one_of": [4.0, 5.0] } });
     let compatibilities = json!({ "/model/compatibility": { "one_of": ["virtual_work", "projection"] } });
     let shapes = json!({ "/drive/teeth/shape": { "one_of": ["cylinder", "ball"] } });
@@ -163,7 +162,7 @@ fn a_field_of_the_base_that_no_variant_knows_is_refused_and_not_left_out() {
         (radii(), "/drive/teeth/instaled", json!(14)),
         (compatibilities, "/model/stiffnes", json!({ "law": "linear" })),
         (shapes.clone(), "/drive/teeth/groove_radius", json!({ "ring": 5.0 })),
-        // Of a shape that is none of the choices.
+        // This field belongs to a shape outside the choices.
         (shapes.clone(), "/drive/teeth/flat_length_mm", json!(3.0)),
     ] {
         let study = map(over, json!(["coincidence_degree"]));
@@ -171,14 +170,13 @@ fn a_field_of_the_base_that_no_variant_knows_is_refused_and_not_left_out() {
         let study = with(&study, "/base", with(&base, place, value));
         assert_eq!(faulty(&study), (format!("/base{place}"), "unknown_field".into()), "{place}");
     }
-    // What one of the choices has is left out of the others.
+    // A field of one choice is left out of the others.
     let base = with(&paper(), "/drive/teeth/groove_radius_mm", json!({ "ring": 6.0 }));
     answer(&with(&map(shapes, json!(["coincidence_degree"])), "/base", base));
 }
 
-/// What is put into an object that the base has not was put in the place of anything else that stood there.
 #[test]
-fn a_value_of_the_base_that_cannot_stand_above_a_field_is_refused_and_not_replaced() {
+fn wrong_parent_value_of_base_is_refused() {
     let radii = || json!({ "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0, "steps": 2 } });
     let varied = |pointer: &str, min: f64| json!({ pointer: { "min": min, "max": 2.0 * min, "steps": 2 } });
     for (over, place, value) in [
@@ -197,18 +195,18 @@ fn a_value_of_the_base_that_cannot_stand_above_a_field_is_refused_and_not_replac
     }
 }
 
-/// One pointer of ten thousand slashes took fifty megabytes: each of its beginnings was copied.
+/// Copies of all its prefixes would take much memory.
 #[test]
-fn a_pointer_deeper_than_any_document_is_refused_before_anything_is_made_of_it() {
+fn too_deep_pointer_is_refused_beforehand() {
     let deep = "/".repeat(1 << 20);
     let over = json!({ deep: { "min": 0, "max": 1, "steps": 2 } });
     let (at, code) = faulty(&map(over, json!([])));
     assert!(at.starts_with("/over/~1~1") && code == "unknown_field", "{code}");
 }
 
-/// Of `min + i/(n-1)·(max-min)` two thirds were none: 7.999999999999999.
+/// `min + i/(n-1)·(max-min)` gives values such as 7.999999999999999.
 #[test]
-fn every_grid_of_whole_numbers_is_one() {
+fn every_grid_of_whole_numbers_has_whole_numbers() {
     for (min, by, count) in [(2, 1, 48), (20, 5, 30), (10, 10, 16), (20, 2, 39)] {
         let max = min + by * (count - 1);
         let over = json!({ "/drive/teeth/count": { "min": min, "max": max, "steps": count } });
@@ -218,9 +216,8 @@ fn every_grid_of_whole_numbers_is_one() {
     }
 }
 
-/// Of two ranges of one name the first was dropped, of two limits as well.
 #[test]
-fn a_name_that_stands_twice_is_refused_wherever_it_stands() {
+fn duplicate_name_is_refused_everywhere() {
     let range = r#"{ "min": 3, "max": 5, "steps": 2 }"#;
     let base = paper();
     let twice = |list: &str, name: &str, one: &str, rest: &str| {
@@ -236,9 +233,8 @@ fn a_name_that_stands_twice_is_refused_wherever_it_stands() {
     assert_eq!(limit, ("/require/slot_wall_mm".into(), FieldCode::DuplicateField));
 }
 
-/// Each variant was refused, one after the other.
 #[test]
-fn values_of_the_base_that_go_together_in_no_variant_are_refused_before_any() {
+fn contradictory_base_is_refused_before_any_variant() {
     let point = |share: f64| json!({ "input_torque_nm": 20.0, "input_speed_rpm": 500.0, "share_of_time": share });
     let radii = || json!({ "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0, "steps": 2 } });
     let torques = || json!({ "/load/input_torque_nm": { "min": 4.0, "max": 5.0, "steps": 2 } });
@@ -258,9 +254,9 @@ fn values_of_the_base_that_go_together_in_no_variant_are_refused_before_any() {
     }
 }
 
-/// RFC 6901 knows no `00` and no `+0`. Beside `0` such a name made two columns of one value, of which one was not in force.
+/// RFC 6901 allows neither `00` nor `+0`. Beside `0` they would set one value twice.
 #[test]
-fn an_entry_of_a_list_has_one_name() {
+fn list_entry_has_one_name() {
     let point = json!({ "input_torque_nm": 20.0, "input_speed_rpm": 500.0, "share_of_time": 1.0 });
     let base = with(&paper(), "/load", json!({ "duty": [point] }));
     let study = |name: &str| {
@@ -276,7 +272,7 @@ fn an_entry_of_a_list_has_one_name() {
 }
 
 #[test]
-fn what_leads_past_a_value_of_the_base_is_at_fault_and_not_the_base() {
+fn pointer_past_a_value_is_at_fault() {
     let of = |pointer: &str| faulty(&map(json!({ pointer: { "min": 3.0, "max": 5.0, "steps": 2 } }), json!([])));
     for pointer in [
         "/drive/teeth/radius_mm/",
@@ -287,7 +283,7 @@ fn what_leads_past_a_value_of_the_base_is_at_fault_and_not_the_base() {
         let at = format!("/over/{}", pointer.replace('/', "~1"));
         assert_eq!(of(pointer), (at, "unknown_field".into()));
     }
-    // Where the base has no fields of a kind, they may still be put there.
+    // An omitted object of the base may get fields.
     let base = with(&paper(), "/load/allowable_stress_mpa", json!(1500.0));
     let alone = json!({ "one_of": [1500.0] });
     let over = json!({
@@ -300,9 +296,9 @@ fn what_leads_past_a_value_of_the_base_is_at_fault_and_not_the_base() {
     assert!(at_1000 < at_1500);
 }
 
-/// They were refused for want of a speed, which every point of a duty has.
+/// Each point of a duty has its own speed.
 #[test]
-fn of_a_duty_losses_are_those_of_its_sweep_over_all_points() {
+fn duty_losses_cover_all_points() {
     let point = |torque_nm: f64, speed_rpm: f64, share_of_time: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": speed_rpm, "share_of_time": share_of_time });
     let duty = json!({ "duty": [point(2.0, 3000.0, 0.75), point(20.0, 500.0, 0.25)] });
     let friction = json!({
@@ -327,15 +323,15 @@ fn of_a_duty_losses_are_those_of_its_sweep_over_all_points() {
     for (name, of_sweep) in names.into_iter().zip(of_sweep) {
         assert_eq!(numbers(&found["possible"]["quantities"][name])[0], of_sweep, "{name}");
     }
-    // Without friction it is that which is wanting.
+    // Without friction, the fault is the missing friction.
     let base = with(&paper(), "/load", base["load"].clone());
     let study = json!({ "study": "map", "base": base, "over": over, "quantities": ["power_loss_w"] });
     assert_eq!(faulty(&study), ("/base/friction".into(), "missing_field".into()));
 }
 
-/// Each was carried out: a column twice, a line twice, or a whole map of drives that cannot be.
+/// The cases are a repeated column, a repeated line, and a map of impossible drives.
 #[test]
-fn a_map_of_which_nothing_can_be_is_refused_before_it_runs() {
+fn map_without_possible_variant_is_refused_beforehand() {
     let radius = |over: Value| map(json!({ "/drive/teeth/radius_mm": over }), json!(["undercut"]));
     let steps = || radius(json!({ "min": 3.0, "max": 7.0, "steps": 5 }));
     let of_torque = |base: Value| {
@@ -370,14 +366,14 @@ fn a_map_of_which_nothing_can_be_is_refused_before_it_runs() {
     ] {
         assert_eq!(faulty(&document), (at, code.to_owned()), "{document}");
     }
-    // A single value may be asked for, and teeth that touch at some radii are what a map is for.
+    // A single value is allowed, and teeth may touch at some radii of a map.
     assert_eq!(numbers(&answer(&radius(json!({ "min": 4.0, "max": 4.0, "steps": 1 })))["possible"]["variant"]), [0.0]);
     let some = answer(&with(&steps(), "/base/drive/teeth/radius_mm", json!(9.0)));
     assert_eq!(numbers(&some["possible"]["variant"]).len(), 5);
 }
 
 #[test]
-fn what_fingers_give_way_is_what_the_sweep_estimates_as_they_are_held() {
+fn finger_compliance_matches_estimate_of_sweep() {
     let over = json!({ "/drive/teeth/radius_mm": { "one_of": [5.0] } });
     let johnson = json!({ "compatibility": "virtual_work", "stiffness": { "law": "johnson" } });
     let mut shares = Vec::new();
@@ -394,13 +390,13 @@ fn what_fingers_give_way_is_what_the_sweep_estimates_as_they_are_held() {
         shares.push(share);
     }
     assert!(shares[0] > 0.0 && shares[1] > 10.0 * shares[0], "{shares:?}");
-    // The linear law, whose own error is as large, has none.
+    // The linear law has an error as large and so no estimate.
     let linear = answer(&map(over, json!(["carrier_finger_share"])));
     assert_eq!(numbers(&linear["possible"]["quantities"]["carrier_finger_share"]), [0.0]);
 }
 
 #[test]
-fn choices_give_what_a_range_of_the_same_values_gives() {
+fn choices_equal_a_range_of_same_values() {
     let torques: Vec<_> = (10..266).collect();
     let base = with(&paper(), "/deviations", json!({ "slot_wall_um": vec![0; 28], "ring_space_um": vec![0; 26] }));
     let over = json!({

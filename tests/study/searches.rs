@@ -9,7 +9,7 @@ use toothwave_study::{Limits, Study};
 
 use crate::asking::{CALCULATION, LIMITS, answer, faulty, paper, study, with};
 
-/// Two objectives that pull at the teeth's radius, the diameter being theirs, and a limit.
+/// Returns a search with two opposing objectives of the teeth's radius and one limit.
 fn search() -> Value {
     json!({
         "study": "search", "base": paper(), "evaluations": 4000,
@@ -23,7 +23,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// The area between a front and a corner that everything beats; both objectives are to be greatest.
+/// Returns the area between a front and a reference corner. Both objectives are maximised.
 fn hypervolume(points: &[(f64, f64)], corner: (f64, f64)) -> f64 {
     let mut points: Vec<_> = points.iter().filter(|point| point.0 > corner.0 && point.1 > corner.1).collect();
     points.sort_by(|one, other| other.0.total_cmp(&one.0));
@@ -38,9 +38,8 @@ fn hypervolume(points: &[(f64, f64)], corner: (f64, f64)) -> f64 {
     area
 }
 
-/// It put an object with its own number of samples in the place of what the base had.
 #[test]
-fn a_search_replaces_nothing_of_the_base_that_reading_it_refuses() {
+fn search_replaces_no_invalid_base_value() {
     let swept = with(&search(), "/objectives/0", json!({ "quantity": "peak_stress_ring_mpa", "goal": "min" }));
     let envelope = json!({
         "study": "search", "base": {}, "require": { "transmission_ratio": { "min": 10, "max": 20 }, "outer_diameter_mm": { "max": 120 } },
@@ -54,9 +53,9 @@ fn a_search_replaces_nothing_of_the_base_that_reading_it_refuses() {
     }
 }
 
-/// Those of an island that has no evaluations left for them were never looked at, or looked at beyond what was asked.
+/// Further starts would never be evaluated, or would exceed the requested number.
 #[test]
-fn there_are_no_more_designs_to_begin_with_than_each_island_looks_at() {
+fn starts_are_limited_by_evaluations_of_each_island() {
     let started = |count: usize| {
         let study = with(&search(), "/evaluations", json!(100));
         with(&study, "/start", json!(vec![paper(); count]))
@@ -66,7 +65,7 @@ fn there_are_no_more_designs_to_begin_with_than_each_island_looks_at() {
 }
 
 #[test]
-fn the_front_is_that_of_all_drives_of_a_fine_grid() {
+fn front_matches_fine_grid() {
     let map = json!({
         "study": "map", "base": paper(), "quantities": ["slot_wall_mm", "carrier_radial_space_mm", "undercut"],
         "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.5, "steps": 226 }, "/drive/wave_generator/semi_minor_mm": { "min": 55.0, "max": 57.5, "steps": 126 } }
@@ -93,9 +92,9 @@ fn the_front_is_that_of_all_drives_of_a_fine_grid() {
     }
 }
 
-/// Both are true peaks, one without the columns: they agree as far as the document's tolerance says.
+/// Both are true peaks, one without columns, and agree within the document's tolerance.
 #[test]
-fn a_design_of_the_front_has_the_figures_that_its_own_document_is_answered_with() {
+fn front_design_has_figures_of_its_document() {
     let study = with(&search(), "/objectives/0", json!({ "quantity": "peak_stress_ring_mpa", "goal": "min" }));
     let study = with(&study, "/evaluations", json!(1000));
     let found = answer(&study);
@@ -110,12 +109,12 @@ fn a_design_of_the_front_has_the_figures_that_its_own_document_is_answered_with(
 }
 
 #[test]
-fn the_reasons_of_what_is_not_in_the_front_add_up() {
+fn reasons_outside_the_front_add_up() {
     let found = answer(&search());
     let scan = &found["scan"];
     let limit = &found["limits"][0];
     assert_eq!((&limit["quantity"], &limit["bound"]), (&json!("undercut"), &json!("is")));
-    // There is one limit: what falls, falls to it alone.
+    // There is one limit, so each failed variant fails it alone.
     assert_eq!(limit["fell"], limit["fell_alone"]);
     let count = |value: &Value| value.as_u64().unwrap();
     assert_eq!(count(&scan["variants"]), 800);
@@ -125,9 +124,9 @@ fn the_reasons_of_what_is_not_in_the_front_add_up() {
     assert_eq!(reasons, count(&scan["impossible"]));
 }
 
-/// The root radius is a + 2 r, 64 mm at least: 153.6 mm with its rim.
+/// The root radius a + 2 r is at least 64 mm: 153.6 mm with its rim.
 #[test]
-fn where_nothing_is_possible_the_least_relaxation_is_told() {
+fn impossible_search_reports_least_relaxation() {
     let study = with(&search(), "/require/outer_diameter_mm", json!({ "max": 150.0 }));
     let found = answer(&study);
     assert_eq!(found["front"], json!([]));
@@ -138,8 +137,8 @@ fn where_nothing_is_possible_the_least_relaxation_is_told() {
     assert!((number(&found["nearest_miss"]["quantities"]["outer_diameter_mm"]) - 153.6).abs() < 0.5);
 }
 
-/// A search of which a user found one relaxation missing, or too large. All contacts follow the same power of the force, so that of each shape the
-/// product of stress and size is the same: the least stress within 30 mm says how large the ring must be for 900 MPa.
+/// All contacts follow the same power of the force, so stress times size is constant for each shape: the least stress
+/// within 30 mm gives the ring size for 900 MPa.
 #[test]
 fn each_relaxation_is_within_one_percent() {
     let base = json!({
@@ -183,7 +182,7 @@ fn each_relaxation_is_within_one_percent() {
     }
 }
 
-/// Without undercut all contact ratios are alike: as ends of their objective these designs filled the archive, and others were lost.
+/// Without undercut all contact ratios are equal, so these designs must not fill the archive as ends of an objective.
 #[test]
 fn front_grows_no_worse_with_more_evaluations() {
     let study = json!({
@@ -211,7 +210,7 @@ fn front_grows_no_worse_with_more_evaluations() {
 }
 
 #[test]
-fn a_limit_that_the_front_leans_on_binds() {
+fn limit_at_the_front_binds() {
     let study = with(&search(), "/require/outer_diameter_mm", json!({ "max": 160.0 }));
     let study = with(&study, "/objectives/0", json!({ "quantity": "ring_tooth_height_mm", "goal": "max" }));
     let found = answer(&study);
@@ -249,7 +248,7 @@ fn counts_and_kinds_are_free_too() {
 }
 
 #[test]
-fn who_knows_only_ratio_torque_and_space_has_a_drive() {
+fn ratio_torque_and_space_suffice_for_a_drive() {
     let study = json!({
         "study": "search", "evaluations": 6000,
         "base": { "load": { "output_torque_nm": 200.0, "allowable_stress_mpa": 1500.0 } },
@@ -266,7 +265,7 @@ fn who_knows_only_ratio_torque_and_space_has_a_drive() {
     }
 }
 
-/// What a designer knows who has no drive yet.
+/// Returns requirements without a drive.
 fn requirements() -> Value {
     json!({
         "study": "search", "evaluations": 2000,
@@ -276,9 +275,9 @@ fn requirements() -> Value {
     })
 }
 
-/// A base with any kind of wave generator was refused at `/free/…/amplitude_mm`, which nobody had given.
+/// Defaults follow for every kind of wave generator and shape of teeth.
 #[test]
-fn what_is_free_follows_for_every_kind_of_wave_generator_and_every_shape_of_teeth() {
+fn every_kind_of_base_has_free_fields() {
     for (wave_generator, lobes, free) in [
         (json!({}), 2, ["semi_major_mm", "semi_minor_mm"]),
         (json!({ "kind": "ellipse" }), 2, ["semi_major_mm", "semi_minor_mm"]),
@@ -311,23 +310,23 @@ fn what_is_free_follows_for_every_kind_of_wave_generator_and_every_shape_of_teet
 }
 
 #[test]
-fn the_number_of_teeth_follows_from_those_of_the_ring() {
+fn tooth_count_follows_from_ring_teeth() {
     let study = with(&requirements(), "/base/drive", json!({ "ring": { "teeth": 38 } }));
     for found in answer(&study)["front"].as_array().unwrap() {
         assert_eq!(found["design"]["drive"]["teeth"]["count"], 40);
     }
 }
 
-/// Each refusal stands at a field that was given, or names the one that is missing.
+/// Each refusal points to a given field or names the missing one.
 #[test]
-fn a_newcomer_is_refused_at_what_was_given() {
+fn incomplete_request_is_refused_at_a_given_field() {
     let detail = |document: &Value| {
         let refused = study(document).expect_err("the study can be carried out");
         refused.errors[0].detail.clone()
     };
     let mut others = Vec::new();
     for (pointer, value, at, code, says) in [
-        // Two lobes: ratios are halves.
+        // With two lobes, ratios are multiples of one half.
         (
             "/require/transmission_ratio",
             json!({ "min": 19.6, "max": 19.9 }),
@@ -347,15 +346,9 @@ fn a_newcomer_is_refused_at_what_was_given() {
             json!({ "min": 20 }),
             "/free",
             "missing_field",
-            "`transmission_ratio` from both sides",
+            "`min` and `max` of `transmission_ratio`",
         ),
-        (
-            "/require/outer_diameter_mm",
-            json!({ "min": 100 }),
-            "/free",
-            "missing_field",
-            "`outer_diameter_mm` from above",
-        ),
+        ("/require/outer_diameter_mm", json!({ "min": 100 }), "/free", "missing_field", "`max` of `outer_diameter_mm`"),
         (
             "/require/outer_diameter_mm",
             json!({ "max": -120 }),
@@ -387,7 +380,7 @@ fn a_newcomer_is_refused_at_what_was_given() {
             "missing_field",
             "`free`",
         ),
-        ("/start", json!([{}]), "/start/0/drive/teeth/count", "missing_field", "begin with"),
+        ("/start", json!([{}]), "/start/0/drive/teeth/count", "missing_field", "no value"),
         (
             "/start",
             json!([{ "drive": { "teeth": { "count": 40.5 } } }]),
@@ -414,9 +407,9 @@ fn a_newcomer_is_refused_at_what_was_given() {
     assert_eq!(faulty(&complete), ("/free".into(), "missing_field".into()), "everything stands in the base");
 }
 
-/// A sweep to a tolerance, which a duty refuses, was asked of whatever was to be in the front: it was empty.
+/// A duty refuses a tolerance sweep, so the search must not ask for one.
 #[test]
-fn a_search_under_a_duty_has_a_front_at_its_hardest_point() {
+fn search_under_duty_has_front_at_hardest_point() {
     let point =
         |torque_nm: f64| json!({ "input_torque_nm": torque_nm, "input_speed_rpm": 1000.0, "share_of_time": 0.5 });
     let under = |load: Value| {
@@ -432,9 +425,9 @@ fn a_search_under_a_duty_has_a_front_at_its_hardest_point() {
     assert!((best(&of_duty) / best(&of_hardest) - 1.0).abs() < 2e-3, "{} and {}", best(&of_duty), best(&of_hardest));
 }
 
-/// JSON pointers lead into arrays too (RFC 6901); the whole of the array was replaced, and the base blamed.
+/// JSON pointers lead into arrays too (RFC 6901).
 #[test]
-fn an_entry_of_a_list_is_a_field() {
+fn list_entry_is_a_field() {
     let point =
         |torque_nm: f64| json!({ "output_torque_nm": torque_nm, "input_speed_rpm": 1000.0, "share_of_time": 0.5 });
     let base = with(&paper(), "/load", json!({ "duty": [point(200.0), point(100.0)] }));
@@ -447,7 +440,7 @@ fn an_entry_of_a_list_is_a_field() {
 }
 
 #[test]
-fn a_start_is_looked_at_first() {
+fn start_is_evaluated_first() {
     let study = with(&search(), "/start", json!([paper()]));
     let study = with(&study, "/evaluations", json!(100));
     assert!(!answer(&study)["front"].as_array().unwrap().is_empty());
@@ -456,7 +449,7 @@ fn a_start_is_looked_at_first() {
 }
 
 #[test]
-fn what_cannot_be_searched_is_said_at_its_field() {
+fn impossible_search_is_refused_at_its_field() {
     for (pointer, value, at, code) in [
         ("/objectives", json!([]), "/objectives", "missing_field"),
         ("/objectives/1/quantity", json!("slot_wall_mm"), "/objectives/1/quantity", "conflicting_fields"),
@@ -479,9 +472,8 @@ fn what_cannot_be_searched_is_said_at_its_field() {
     }
 }
 
-/// Each was carried out, to an empty front or to one design that nothing had led to.
 #[test]
-fn a_search_that_nothing_free_can_answer_is_refused_before_it_runs() {
+fn search_without_effective_free_field_is_refused() {
     let radius = "/free/~1drive~1teeth~1radius_mm";
     let only = |pointer: &str, range: Value| with(&search(), "/free", json!({ pointer: range }));
     let requiring = |name: &str, required: Value| with(&search(), "/require", json!({ name: required }));
@@ -550,7 +542,7 @@ fn a_search_that_nothing_free_can_answer_is_refused_before_it_runs() {
         }
     }
     assert!(others.is_empty(), "{}", others.join("\n"));
-    // What is kept whatever is free is no fault, nor a range of which a part can be.
+    // A limit that always holds is no fault, nor is a range that is possible in part.
     for document in [
         requiring("transmission_ratio", json!({ "min": 13.0 })),
         with(&search(), radius, json!({ "min": -2.0, "max": 5.0 })),
@@ -559,9 +551,9 @@ fn a_search_that_nothing_free_can_answer_is_refused_before_it_runs() {
     }
 }
 
-/// What a quantity is said to depend on is all that changes it: every other number of a document leaves it as it is.
+/// Each quantity declares the fields on which it depends.
 #[test]
-fn what_a_quantity_is_not_said_to_depend_on_leaves_it_as_it_is() {
+fn undeclared_fields_do_not_change_a_quantity() {
     let base = json!({
         "drive": { "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 }, "teeth": { "count": 28, "radius_mm": 5.0, "width_mm": 15.0 }, "ring": { "teeth": 26 } },
         "load": { "input_torque_nm": 20.0, "input_speed_rpm": 1000.0, "allowable_stress_mpa": 1500.0 },
@@ -603,7 +595,7 @@ fn what_a_quantity_is_not_said_to_depend_on_leaves_it_as_it_is() {
 
 /// Each design of the front is a whole document.
 #[test]
-fn what_a_search_of_a_long_document_comes_to_is_bounded_with_the_studies() {
+fn result_size_of_long_document_is_bounded() {
     let of = |entries: usize| {
         let drive = json!({
             "wave_generator": { "semi_major_mm": 20_600.0, "semi_minor_mm": 20_599.0 },
@@ -618,7 +610,7 @@ fn what_a_search_of_a_long_document_comes_to_is_bounded_with_the_studies() {
         })
     };
     let bytes = |entries| study(&of(entries)).unwrap().answer_bytes();
-    // 200 designs, each with eight bytes an entry at least.
+    // 200 designs with at least eight bytes an entry.
     assert!(bytes(9000) - bytes(1000) >= 200 * 8 * 8000);
     let limits = Limits { max_study_bytes: 8 << 20, ..LIMITS };
     let read = |entries| Study::read(of(entries).to_string().as_bytes(), &limits);

@@ -1,4 +1,4 @@
-//! Results as tables: Parquet holds what CSV does.
+//! Results as tables: Parquet and CSV hold the same cells.
 
 use bytes::Bytes;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -15,7 +15,7 @@ fn cells_of_csv(gathered: &Gathered) -> Vec<Vec<String>> {
     csv.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect()
 }
 
-/// The names, then the rows as CSV spells them.
+/// Returns the names, then the rows in CSV spelling.
 fn cells_of_parquet(gathered: &Gathered) -> Vec<Vec<String>> {
     let mut bytes = Vec::new();
     gathered.answer().write(Format::Parquet, &mut bytes).unwrap();
@@ -54,7 +54,7 @@ fn assert_same(document: &Value) -> usize {
 }
 
 #[test]
-fn a_result_has_the_same_cells_as_parquet_and_as_csv() {
+fn parquet_and_csv_have_the_same_cells() {
     let radius = json!({ "min": 3.0, "max": 8.0, "steps": 11 });
     let map = json!({
         "study": "map", "base": paper(), "quantities": ["peak_stress_ring_mpa", "undercut"],
@@ -76,16 +76,16 @@ fn a_result_has_the_same_cells_as_parquet_and_as_csv() {
         "inputs": { "/drive/teeth/radius_mm": normal }
     });
     assert_eq!(assert_same(&tolerance), 9);
-    // Where nothing was found there are the names.
+    // Without results, the table has only names.
     let impossible = with(&search, "/require", json!({ "outer_diameter_mm": { "max": 1.0 } }));
     assert_eq!(assert_same(&impossible), 0);
 }
 
 #[test]
-fn a_table_of_many_columns_is_written_in_groups_of_fewer_rows_and_says_what_it_holds_for_them() {
+fn wide_table_has_small_row_groups() {
     let fields = (0..200).map(|entry| (format!("/deviations/slot_wall_um/{entry}"), json!({ "one_of": [0] })));
     let mut over: serde_json::Map<_, _> = fields.collect();
-    // Nearly all of them impossible, so that they take no time.
+    // Nearly all variants are impossible, which makes them fast.
     over.insert("/drive/teeth/radius_mm".into(), json!({ "min": 1.0, "max": 900.0, "steps": 6000 }));
     let drive = json!({
         "wave_generator": { "semi_major_mm": 600.0, "semi_minor_mm": 599.0 },
@@ -103,21 +103,21 @@ fn a_table_of_many_columns_is_written_in_groups_of_fewer_rows_and_says_what_it_h
     let most =
         groups.iter().map(|group| group.num_rows() * i64::try_from(group.columns().len()).unwrap()).max().unwrap();
     assert!(groups.len() > 1 && most <= 1 << 19, "{most} cells in one of {} groups", groups.len());
-    // A number takes 8 bytes at the very least.
+    // A number takes at least 8 bytes.
     let beside = answer.held_bytes(Format::Parquet) - answer.held_bytes(Format::Csv);
     assert!(beside >= 8 * u64::try_from(most).unwrap(), "{beside} bytes for {most} cells");
 }
 
-/// More rows than a group of Parquet holds.
+/// It has more rows than one Parquet row group.
 #[test]
-fn a_large_map_comes_in_several_groups() {
+fn large_map_has_several_row_groups() {
     let steps = json!({ "min": 10.0, "max": 20.0, "steps": 70_000 });
     let map = json!({ "study": "map", "base": paper(), "quantities": ["transmission_ratio"], "over": { "/load/input_torque_nm": steps } });
     assert_eq!(assert_same(&map), 70_000);
 }
 
 #[test]
-fn the_text_of_many_inputs_has_its_room_before_it_is_written_and_less_than_twice_that() {
+fn text_size_of_many_inputs_is_estimated_beforehand() {
     let mut base = with(&paper(), "/model/compatibility", json!("virtual_work"));
     base["deviations"] = json!({ "tooth_radius_um": (1..=28).collect::<Vec<_>>() });
     let inputs: serde_json::Map<_, _> =

@@ -1,4 +1,4 @@
-//! What is asked of the answers: where a sweep looks, how fine a profile is, what is drawn.
+//! Settings of the endpoints: input angles of a sweep, sampling of profiles, parts and assembly of drawings.
 
 use serde::{Deserialize, Serialize};
 use toothwave_solver::backing::{Fingers, Rim};
@@ -11,33 +11,35 @@ use crate::key::{Encode, Encoder, encoded};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct SweepDocument {
-    /// Equal intervals of one period; both ends are included. 50 where neither this nor `tolerance` is given.
+    /// Number of equal intervals of one period; both ends are included. Default: 50, if `tolerance` is not given
+    /// either.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 1, maximum = 10000000, default = 50, required = false)]
     pub samples: Option<Whole>,
-    /// Instead of `samples`: the true extremes to this relative tolerance, of every force and stress, of wind-up, torsional stiffness and torque
-    /// capacity. Places and half-widths are known to its root, the transmission error to the tolerance times the wind-up. Input angles are
-    /// placed where they are needed, and the instant at which a tooth enters twice, without it and with it.
+    /// Relative tolerance of the extremes of every force and stress, of wind-up, torsional stiffness and torque
+    /// capacity. Use it instead of `samples`. Positions and half-widths are accurate to its square root, the
+    /// transmission error to the tolerance times the wind-up. Input angles are placed where they are needed. The angle
+    /// at which a tooth enters is listed twice, without and with that tooth.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 0.1, nullable = false)]
     pub tolerance: Option<f64>,
-    /// Whether wind-up and torsional stiffness are wanted too.
+    /// True if the answer includes wind-up and torsional stiffness. Default: false.
     #[serde(default)]
     #[schema(default = false)]
     pub wind_up: bool,
 }
 
-/// The paper's number of intervals.
+/// Number of intervals in the paper.
 pub(super) const DEFAULT_SAMPLES: Whole = Whole(50.0);
 
 /// The sampling of profiles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct ProfileDocument {
-    /// How far a chord may be from its curve.
+    /// Largest distance of a chord from its curve, in mm. Default: 0.001 mm.
     #[schema(minimum = 1e-6, maximum = 1e6, default = 0.001)]
     pub chord_tolerance_mm: f64,
-    /// How much of the ring.
+    /// Part of the ring to draw: one tooth or the full ring. Default: one tooth.
     pub extent: ExtentDocument,
 }
 
@@ -47,11 +49,11 @@ impl Default for ProfileDocument {
     }
 }
 
-/// What is asked of `/v1/accuracy`.
+/// Settings of `/v1/accuracy`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct AccuracyDocument {
-    /// The relative error of the peaks that the cheapest way has to meet.
+    /// Relative error of the peaks that the recommended settings must meet. Default: 1e-6.
     #[schema(minimum = 1e-12, maximum = 1.0, default = 1e-6)]
     pub requested_error: f64,
 }
@@ -62,7 +64,7 @@ impl Default for AccuracyDocument {
     }
 }
 
-/// How much of the ring.
+/// Part of the ring to draw.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ExtentDocument {
@@ -73,8 +75,8 @@ pub enum ExtentDocument {
     Full,
 }
 
-/// The parts as they are made. A part's clearance sets its working surface back into the part along the surface's normal; the
-/// gap at a contact is the sum of its two parts' clearances, in drawings and forces alike.
+/// The parts as manufactured. A part's clearance offsets its working surface into the part along the surface's normal.
+/// The gap at a contact is the sum of its two parts' clearances, in drawings and forces alike.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct PartsDocument {
@@ -89,102 +91,107 @@ pub struct PartsDocument {
 }
 
 impl PartsDocument {
-    /// What of them a load's answer depends on: gaps, and what stands behind the contacts.
+    /// Returns the data of the parts on which a load's answer depends: gaps, and the supports of the contacts.
     pub(crate) fn under_load(&self) -> impl Encode + '_ {
         let Self { wave_generator, teeth, ring, carrier } = self;
         (wave_generator, teeth, ring, ring.rim, carrier, carrier.fingers)
     }
 }
 
-/// The wave generator as it is made.
+/// The wave generator as manufactured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct WaveGeneratorPartDocument {
-    /// Radius of its bore; null or left out, it has none.
+    /// Radius of its bore, in mm. Null or left out: no bore.
     #[serde(default)]
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub bore_radius_mm: Option<f64>,
-    /// How far the cam is set back inward.
+    /// Inward offset of the cam, in µm. Default: 0 µm.
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
 }
 
-/// The teeth as they are made.
+/// The teeth as manufactured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct ToothPartDocument {
-    /// How much smaller their radius is than `drive.teeth.radius_mm`.
+    /// Reduction of their radius from `drive.teeth.radius_mm`, in µm. Default: 0 µm.
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
 }
 
-/// The ring as it is made.
+/// The ring as manufactured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RingPartDocument {
-    /// Outer radius; left out, 1.2 times the largest radius of the tooth spaces, that of the root but for a tip relief that reaches beyond it.
+    /// Outer radius, in mm. Default: 1.2 times the largest radius of the tooth spaces. This is the root radius, unless
+    /// a tip relief extends beyond it.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub outer_radius_mm: Option<f64>,
-    /// How far the flank is set back outward; a bored tip stays where it is.
+    /// Outward offset of the flank, in µm. A bored tip keeps its radius. Default: 0 µm.
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
-    /// What stands around its rim; a sweep says what gives way so, drawings do not read it. Left out, findings take it as housed.
+    /// Support of the ring's rim. A sweep estimates the compliance from it; drawings do not use it. Default: a rigid
+    /// housing, assumed by the findings.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub rim: Option<RimDocument>,
 }
 
-/// What stands around the ring's rim.
+/// Support of the ring's rim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RimDocument {
-    /// A rigid housing.
+    /// The rim is in a rigid housing.
     Housed,
-    /// Nothing: it is kept from turning alone.
+    /// The rim is free to deform; the ring is only kept from rotating.
     Free,
 }
 
-/// What joins the carrier's fingers beside the teeth.
+/// Support of the carrier's fingers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FingersDocument {
-    /// A disc at either end.
+    /// A disc at both ends of the fingers.
     HeldAtBothEnds,
-    /// A disc at one end.
+    /// A disc at one end of the fingers.
     HeldAtOneEnd,
 }
 
-/// The carrier as it is made.
+/// The carrier as manufactured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct CarrierPartDocument {
-    /// Inner radius; left out, a tenth of the annulus between cam and ring tips is left free inside. Flat-sided teeth are borne from here.
+    /// Inner radius, in mm. Default: one tenth of the annulus between cam and ring tips stays free inside. Slot walls
+    /// support flat-sided teeth from this radius on.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub inner_radius_mm: Option<f64>,
-    /// Outer radius; left out, a tenth of that annulus is left free outside. Flat-sided teeth are borne up to here.
+    /// Outer radius, in mm. Default: one tenth of that annulus stays free outside. Slot walls support flat-sided teeth
+    /// up to this radius.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub outer_radius_mm: Option<f64>,
-    /// How far each wall of a slot is set back.
+    /// Offset of each wall of a slot, in µm. Default: 0 µm.
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
-    /// What joins the fingers between its slots beside the teeth; a sweep says what gives way so, drawings do not read it. Left out, findings take
-    /// them as held at both ends.
+    /// Support of the fingers between the slots. A sweep estimates the compliance from it; drawings do not use it.
+    /// Default: held at both ends, assumed by the findings.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub fingers: Option<FingersDocument>,
 }
 
-/// How the parts stand in a drawing of all of them.
+/// Position of the parts in a drawing of the assembly.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct AssemblyDocument {
-    /// Angle of the wave generator from the start position, in which the middle of a lobe, the major axis of an ellipse, and tooth 0 stand in the middle of a tooth space.
+    /// Angle of the wave generator from the start position, in deg. At the start the middle of a lobe
+    /// (the major axis of an ellipse) and tooth 0 are in the middle of a tooth space. Default: 0 deg.
     #[schema(minimum = -1e7, maximum = 1e7, default = 0.0)]
     pub input_angle_deg: f64,
 }
@@ -203,7 +210,7 @@ encoded!(enum ExtentDocument);
 encoded!(enum RimDocument);
 encoded!(enum FingersDocument);
 
-/// Without what holds the part, which drawings do not read: whoever does names it beside.
+/// Without the support of the part, which drawings do not use. Keys that need it add it.
 impl Encode for RingPartDocument {
     fn encode(&self, encoder: &mut Encoder) {
         let Self { outer_radius_mm, clearance_um, rim: _ } = self;
@@ -211,7 +218,7 @@ impl Encode for RingPartDocument {
     }
 }
 
-/// Without what holds the part, as above.
+/// Without the support of the part, as above.
 impl Encode for CarrierPartDocument {
     fn encode(&self, encoder: &mut Encoder) {
         let Self { inner_radius_mm, outer_radius_mm, clearance_um, fingers: _ } = self;

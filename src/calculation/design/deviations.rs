@@ -1,4 +1,4 @@
-//! Single items of the parts as they came out.
+//! Deviations of individual items of the parts.
 
 use serde::{Deserialize, Serialize};
 use toothwave_solver::gaps::{Deviations, Runout};
@@ -7,52 +7,52 @@ use utoipa::ToSchema;
 
 use crate::key::encoded;
 
-/// Single items of the parts as they came out, measured or drawn by lot, with `virtual_work` alone: each number opens a gap where it is
-/// positive. Angles are turned away from the flank under load. A list has one entry for each item, counted from 0, or none, where all are
-/// as drawn.
+/// Deviations of individual items of the parts, measured or random, with `virtual_work` only. A positive value opens a
+/// gap. A positive angle is a rotation away from the flank under load. A list has one entry for each item, counted from
+/// 0, or is empty if no item deviates.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct DeviationsDocument {
-    /// Teeth thinner in their radius, by slot.
+    /// Reduction of the teeth's radius, by slot, in µm.
     #[schema(minimum = -1e6, maximum = 1e6)]
     pub tooth_radius_um: Vec<f64>,
-    /// Slots turned about the axis.
+    /// Rotation of the slots about the axis, by slot, in arcsec.
     #[schema(minimum = -1e5, maximum = 1e5)]
     pub slot_angle_arcsec: Vec<f64>,
-    /// Walls set back, by slot.
+    /// Offset of the slots' walls, by slot, in µm.
     #[schema(minimum = -1e6, maximum = 1e6)]
     pub slot_wall_um: Vec<f64>,
-    /// Profiles set back along their normals, by ring space.
+    /// Offset of the profiles along their normals, by ring space, in µm.
     #[schema(minimum = -1e6, maximum = 1e6)]
     pub ring_space_um: Vec<f64>,
-    /// Ring spaces turned about the axis.
+    /// Rotation of the ring's spaces about the axis, by ring space, in arcsec.
     #[schema(minimum = -1e5, maximum = 1e5)]
     pub ring_space_angle_arcsec: Vec<f64>,
-    /// The wave generator set back along its normals, by lobe.
+    /// Offset of the wave generator along its normals, by lobe, in µm.
     #[schema(minimum = -1e6, maximum = 1e6)]
     pub wave_generator_lobe_um: Vec<f64>,
-    /// The wave generator off the axis; its angle is counted from the middle of lobe 0.
+    /// Runout of the wave generator. Its angle is counted from the middle of lobe 0.
     pub wave_generator_runout: RunoutDocument,
-    /// The ring off the axis; its angle is counted from the middle of space 0.
+    /// Runout of the ring. Its angle is counted from the middle of space 0.
     pub ring_runout: RunoutDocument,
-    /// The carrier off the axis; its angle is counted from slot 0.
+    /// Runout of the carrier. Its angle is counted from slot 0.
     pub carrier_runout: RunoutDocument,
 }
 
-/// A part off the axis, in a direction that is fixed in the part.
+/// Runout: distance of a part's centre from the axis, in a direction that is fixed in the part.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct RunoutDocument {
-    /// How far.
+    /// Distance from the axis, in µm. Default: 0 µm.
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub amount_um: f64,
-    /// In which direction.
+    /// Direction, in deg. Default: 0 deg.
     #[schema(minimum = -360.0, maximum = 360.0, default = 0.0)]
     pub angle_deg: f64,
 }
 
 impl DeviationsDocument {
-    /// Empties each list that has a zero for every item, which says the same.
+    /// Clears each list that has a zero for every item, which is equivalent.
     pub(super) fn leave_out_zeros(&mut self, drive: &DriveParameters) {
         let lobes = drive.wave_generator.lobes();
         for (list, items) in [

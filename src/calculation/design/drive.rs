@@ -1,4 +1,4 @@
-//! Wave generator, teeth and ring: each kind and shape an object of its own.
+//! Wave generator, teeth and ring, with one object for each kind and shape.
 
 use serde::{Deserialize, Serialize};
 use toothwave_solver::{PerContact, ToothShape, WaveGenerator};
@@ -12,84 +12,84 @@ use crate::union::union;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct DriveDocument {
-    /// What pushes the teeth outward.
+    /// Wave generator, which pushes the teeth outward.
     pub wave_generator: WaveGeneratorDocument,
     /// The discrete teeth.
     pub teeth: TeethDocument,
-    /// The rigid internal wheel.
+    /// The rigid internal gear.
     pub ring: RingDocument,
 }
 
 union! {
-    /// What pushes the teeth outward: a cam of one or more lobes; an ellipse where no kind is named.
+    /// Cam with one or more lobes, which pushes the teeth outward. Default kind: ellipse.
     pub enum WaveGeneratorDocument as "WaveGenerator" by "kind" read "by:kind=ellipse" default "ellipse" {
         /// An ellipse.
         Ellipse(EllipseDocument) = "ellipse",
-        /// A circle that turns about a point beside its centre.
+        /// A circle that rotates about a point off its centre.
         Eccentric(EccentricDocument) = "eccentric",
         /// A support function with one harmonic.
         Harmonic(HarmonicDocument) = "harmonic",
-        /// A path of the teeth's centres with one harmonic.
+        /// A path of the tooth centres with one harmonic.
         HarmonicPath(HarmonicPathDocument) = "harmonic_path",
     }
 }
 
-/// The elliptic cam, two lobes; `semi_major_mm` exceeds `semi_minor_mm`.
+/// Elliptic cam with two lobes; `semi_major_mm` must exceed `semi_minor_mm`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct EllipseDocument {
-    /// Semi-major axis a.
+    /// Semi-major axis a, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub semi_major_mm: f64,
-    /// Semi-minor axis b.
+    /// Semi-minor axis b, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub semi_minor_mm: f64,
 }
 
-/// A circle that turns about a point beside its centre, one lobe; `eccentricity_mm` is below `radius_mm`.
+/// Circle that rotates about a point off its centre, one lobe; `eccentricity_mm` must be below `radius_mm`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct EccentricDocument {
-    /// Radius R0 of the circle.
+    /// Radius R0 of the circle, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub radius_mm: f64,
-    /// Distance e of its centre from the axis.
+    /// Distance e of its centre from the axis, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub eccentricity_mm: f64,
 }
 
-/// The cam of the support function R0 + e cos Uφ: of the distance of its tangents from the axis.
+/// Cam with the support function R0 + e cos Uφ, which is the distance of its tangents from the axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct HarmonicDocument {
-    /// Lobes U: teeth pass as many meshing zones in a turn.
+    /// Number of lobes U, and of meshing zones.
     #[schema(value_type = i64, minimum = 1, maximum = 1000)]
     pub lobes: Whole,
-    /// Mean radius R0.
+    /// Mean radius R0, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub mean_radius_mm: f64,
-    /// Amplitude e.
+    /// Amplitude e, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub amplitude_mm: f64,
 }
 
-/// The cam that moves the teeth's centres along R + e cos Uψ.
+/// Cam that moves the tooth centres along R + e cos Uψ.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct HarmonicPathDocument {
-    /// Lobes U: teeth pass as many meshing zones in a turn.
+    /// Number of lobes U, and of meshing zones.
     #[schema(value_type = i64, minimum = 1, maximum = 1000)]
     pub lobes: Whole,
-    /// Mean radius R of the path.
+    /// Mean radius R of the path, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub mean_path_radius_mm: f64,
-    /// Amplitude e.
+    /// Amplitude e, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub amplitude_mm: f64,
 }
 
 union! {
-    /// The discrete teeth; cylinders where no shape is named.
+    /// The discrete teeth. Default shape: cylinder.
     pub enum TeethDocument as "Teeth" by "shape" read "by:shape=cylinder" default "cylinder" {
         /// Cylinders along the axis.
         Cylinder(CylinderDocument) = "cylinder",
@@ -104,91 +104,92 @@ union! {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct CylinderDocument {
-    /// Teeth in theory, Z_G: as many more or fewer than the ring's as the wave generator has lobes.
+    /// Theoretical number of teeth Z_G. It differs from the ring's by the number of lobes of the wave generator.
     #[schema(value_type = i64, minimum = 2, maximum = 10000)]
     pub count: Whole,
-    /// Installed teeth Z'_G, a divisor of `count`; only they have a slot. Left out: `count`.
+    /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
     pub installed: Option<Whole>,
-    /// Radius r of a tooth.
+    /// Radius r of a tooth, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub radius_mm: f64,
-    /// Width L1 of a tooth along the axis.
+    /// Width L1 of a tooth along the axis, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub width_mm: f64,
 }
 
-/// Balls, which may run in grooves along the path of the contact.
+/// Balls, which can run in grooves along the path of the contact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct BallDocument {
-    /// Teeth in theory, Z_G: as many more or fewer than the ring's as the wave generator has lobes.
+    /// Theoretical number of teeth Z_G. It differs from the ring's by the number of lobes of the wave generator.
     #[schema(value_type = i64, minimum = 2, maximum = 10000)]
     pub count: Whole,
-    /// Installed teeth Z'_G, a divisor of `count`; only they have a slot. Left out: `count`.
+    /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
     pub installed: Option<Whole>,
-    /// Radius r of a ball.
+    /// Radius r of a ball, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub radius_mm: f64,
-    /// Radii of the grooves across the path, each above the ball's own; a part that has none is straight along the axis.
+    /// Radii of the grooves across the path, in mm, each larger than the ball's radius. Default: no groove; the part is
+    /// straight along the axis.
     #[serde(default)]
     pub groove_radius_mm: LengthsByContactDocument,
 }
 
-/// Cylinders with two flats, which lie on the walls of the slot.
+/// Cylinders with two flats on the walls of the slot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct FlatSidedDocument {
-    /// Teeth in theory, Z_G: as many more or fewer than the ring's as the wave generator has lobes.
+    /// Theoretical number of teeth Z_G. It differs from the ring's by the number of lobes of the wave generator.
     #[schema(value_type = i64, minimum = 2, maximum = 10000)]
     pub count: Whole,
-    /// Installed teeth Z'_G, a divisor of `count`; only they have a slot. Left out: `count`.
+    /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
     pub installed: Option<Whole>,
-    /// Radius r of a tooth.
+    /// Radius r of a tooth, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub radius_mm: f64,
-    /// Width L1 of a tooth along the axis.
+    /// Width L1 of a tooth along the axis, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub width_mm: f64,
-    /// Length l of a flat along the slot, below the tooth's diameter.
+    /// Length l of a flat along the slot, in mm. It must be below the tooth's diameter.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub flat_length_mm: f64,
 }
 
-/// A length for each contact that has one.
+/// Length for each contact, in mm; each can be left out.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct LengthsByContactDocument {
-    /// At the wave generator.
+    /// At the wave generator, in mm.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub wave_generator: Option<f64>,
-    /// At the ring.
+    /// At the ring, in mm.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub ring: Option<f64>,
-    /// At the carrier.
+    /// At the carrier, in mm.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub carrier: Option<f64>,
 }
 
-/// What every tooth has, whatever its shape.
+/// Data common to teeth of any shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Counted {
     pub(super) count: Whole,
-    /// As it stands in the document.
+    /// Number of installed teeth, as in the document.
     pub(super) installed: Option<Whole>,
     pub(super) radius_mm: f64,
 }
 
 impl WaveGeneratorDocument {
-    /// Where they are given.
+    /// Returns the number of lobes, if it is given.
     pub(super) const fn lobes(&self) -> Option<Whole> {
         match *self {
             Self::Ellipse(_) | Self::Eccentric(_) => None,
@@ -238,7 +239,7 @@ impl LengthsByContactDocument {
 }
 
 impl TeethDocument {
-    /// Writes `installed` out where it is left out.
+    /// Sets `installed` to its default if it is left out.
     pub(super) fn install_all_by_default(&mut self) {
         let count = self.counted().count;
         let (Self::Cylinder(CylinderDocument { installed, .. })
@@ -258,14 +259,15 @@ impl TeethDocument {
     }
 }
 
-/// The rigid internal wheel.
+/// The rigid internal gear.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RingDocument {
-    /// Teeth Z_K: as many fewer or more than the carrier's as the wave generator has lobes, two of an ellipse.
+    /// Number of teeth Z_K. It differs from the teeth's `count` by the number of lobes of the wave generator, two for
+    /// an ellipse.
     #[schema(value_type = i64, minimum = 2, maximum = 10000)]
     pub teeth: Whole,
-    /// Radius of a bore that truncates the teeth; null or left out, the ring keeps its natural tip.
+    /// Radius of a bore that truncates the teeth, in mm. Null or left out: the ring keeps its natural tip.
     #[serde(default)]
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub tip_radius_mm: Option<f64>,
@@ -281,7 +283,8 @@ encoded! {
     struct RingDocument { teeth, tip_radius_mm }
 }
 
-/// With `installed` filled in. The document itself keeps whether it stands there, so that no fault is blamed on a field that does not.
+/// With the default of `installed`. The document keeps the field empty, so that no error refers to a field that is left
+/// out.
 impl Encode for CylinderDocument {
     fn encode(&self, encoder: &mut Encoder) {
         let Self { count, installed, radius_mm, width_mm } = self;
@@ -289,7 +292,7 @@ impl Encode for CylinderDocument {
     }
 }
 
-/// Likewise.
+/// With the default of `installed`, as for cylinders.
 impl Encode for BallDocument {
     fn encode(&self, encoder: &mut Encoder) {
         let Self { count, installed, radius_mm, groove_radius_mm } = self;
@@ -297,7 +300,7 @@ impl Encode for BallDocument {
     }
 }
 
-/// Likewise.
+/// With the default of `installed`, as for cylinders.
 impl Encode for FlatSidedDocument {
     fn encode(&self, encoder: &mut Encoder) {
         let Self { count, installed, radius_mm, width_mm, flat_length_mm } = self;

@@ -14,34 +14,35 @@ use crate::union::union;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct FrictionDocument {
-    /// What the teeth run on.
+    /// Friction of the teeth on the wave generator or its race.
     pub wave_generator: WaveGeneratorFrictionDocument,
-    /// Between teeth and ring.
+    /// Friction between teeth and ring.
     pub ring: CoefficientDocument,
-    /// Between teeth and carrier.
+    /// Friction between teeth and carrier.
     pub carrier: CoefficientDocument,
-    /// How fast the parts wear, by Archard's law; left out, it is not computed.
+    /// Wear rates of the parts for Archard's law, in mm³/(N·m). Default: wear is not calculated.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wear_rate_mm3_per_nm: Option<WearRatesDocument>,
 }
 
-/// The volume that a part loses at its contact with the teeth, in mm³, over force times way of the slip, in N·m.
+/// Wear rate for each part: volume lost at its contact with the teeth over force times sliding distance, in mm³/(N·m).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct WearRatesDocument {
-    /// Of the wave generator, or its race.
+    /// At the wave generator or its race, in mm³/(N·m). Default: 0.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub wave_generator: f64,
-    /// Of the ring.
+    /// At the ring, in mm³/(N·m). Default: 0.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub ring: f64,
-    /// Of the carrier.
+    /// At the carrier, in mm³/(N·m). Default: 0.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub carrier: f64,
 }
 
-/// What rolls in a bearing: its life falls with the third power of the load with balls, with the power 10/3 with rollers.
+/// Rolling element of a bearing. The life falls with the power 3 of the load for balls, and with the power 10/3 for
+/// rollers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BearingElementDocument {
@@ -52,89 +53,92 @@ pub enum BearingElementDocument {
     Roller,
 }
 
-/// Friction of a contact.
+/// Friction of a sliding contact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct CoefficientDocument {
-    /// Coefficient μ.
+    /// Coefficient of friction μ, from 0 to 1.
     #[schema(minimum = 0.0, maximum = 1.0)]
     pub coefficient: f64,
 }
 
 union! {
-    /// What the teeth run on.
+    /// Surface on which the teeth run at the wave generator.
     pub enum WaveGeneratorFrictionDocument as "WaveGeneratorFriction" by "kind" read "by:kind" {
-        /// The cam itself: teeth slide on it.
+        /// The cam itself: the teeth slide on it.
         Plain(CoefficientDocument) = "plain",
-        /// A race around the cam, free to turn: a thin bearing, or the bearing that is the eccentric.
+        /// A race around the cam that rotates freely: a thin bearing, or the bearing that is the eccentric.
         Race(RaceDocument) = "race",
-        /// A race that stands still against the carrier and does not rub on the teeth: the limit of a light bearing.
+        /// A race that is at rest relative to the carrier and does not slide on the teeth: the limit of a light
+        /// bearing.
         Rolling(RollingDocument) = "rolling",
     }
 }
 
-/// A race around the cam, free to turn: a thin bearing, or the bearing that is the eccentric.
+/// A race around the cam that rotates freely: a thin bearing, or the bearing that is the eccentric.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RaceDocument {
-    /// Coefficient μ of teeth on the race.
+    /// Coefficient of friction μ between teeth and race, from 0 to 1.
     #[schema(minimum = 0.0, maximum = 1.0)]
     pub coefficient: f64,
-    /// The bearing's friction couple over its load and radius.
+    /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
     #[schema(minimum = 0.0, maximum = 1.0)]
     pub bearing_coefficient: f64,
-    /// The radius that the bearing's coefficient belongs to.
+    /// Radius R_b for the bearing's coefficient of friction, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub bearing_radius_mm: f64,
-    /// Dynamic load rating C of the bearing that is an eccentric circle: its life by ISO 281 is asked for.
+    /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
+    /// circle. Default: no life is calculated.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-3, maximum = 1e12, nullable = false)]
     pub bearing_load_rating_n: Option<f64>,
-    /// What rolls in it.
+    /// Rolling element of the bearing. Default: ball.
     #[serde(default)]
     pub bearing_element: BearingElementDocument,
 }
 
-/// A race that stands still against the carrier and does not rub on the teeth: the limit of a light bearing.
+/// A race that is at rest relative to the carrier and does not slide on the teeth: the limit of a light bearing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RollingDocument {
-    /// May stand here as with `race`, but nothing depends on it: such a race does not rub on the teeth.
+    /// Allowed as for `race`, but without effect: such a race does not slide on the teeth.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1.0, nullable = false)]
     pub coefficient: Option<f64>,
-    /// The bearing's friction couple over its load and radius.
+    /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
     #[schema(minimum = 0.0, maximum = 1.0)]
     pub bearing_coefficient: f64,
-    /// The radius that the bearing's coefficient belongs to.
+    /// Radius R_b for the bearing's coefficient of friction, in mm.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub bearing_radius_mm: f64,
-    /// Dynamic load rating C of the bearing that is an eccentric circle: its life by ISO 281 is asked for.
+    /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
+    /// circle. Default: no life is calculated.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-3, maximum = 1e12, nullable = false)]
     pub bearing_load_rating_n: Option<f64>,
-    /// What rolls in it.
+    /// Rolling element of the bearing. Default: ball.
     #[serde(default)]
     pub bearing_element: BearingElementDocument,
 }
 
-/// What the life of a bearing follows from.
+/// Data for the life of a bearing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BearingRating {
-    /// C.
+    /// C, in N.
     pub dynamic_load_rating_n: f64,
-    /// What rolls.
+    /// Rolling element.
     pub element: RollingElement,
 }
 
 impl FrictionDocument {
-    /// The wear rates, where there are any.
+    /// Returns the wear rates, if given.
     pub fn wear_rate_mm3_per_nm(&self) -> Option<PerContact<f64>> {
         let WearRatesDocument { wave_generator, ring, carrier } = *self.wear_rate_mm3_per_nm.as_ref()?;
         Some(PerContact { wave_generator, ring, carrier })
     }
 
-    /// What the life of the bearing follows from, where it is asked for.
+    /// Returns the data for the life of the bearing, if a load rating is given.
     pub fn bearing_rating(&self) -> Option<BearingRating> {
         let (rating_n, element) = match &self.wave_generator {
             WaveGeneratorFrictionDocument::Plain(_) => return None,
@@ -144,8 +148,7 @@ impl FrictionDocument {
         Some(BearingRating { dynamic_load_rating_n: rating_n?, element: element.into() })
     }
 
-    /// What is out of its range beside friction itself: wear rates, the bearing's rating, and a coefficient that stands where nothing depends on
-    /// it.
+    /// Returns the violations other than of friction itself: wear rates, load rating, and an unused coefficient.
     pub(super) fn violations_beside(&self) -> Vec<Violation> {
         let rates = self.wear_rate_mm3_per_nm();
         let rates =
@@ -155,7 +158,7 @@ impl FrictionDocument {
         self.idle_violation().into_iter().chain(checked).collect()
     }
 
-    /// The coefficient that stands where nothing depends on it, if it is out of its range.
+    /// Returns the violation of the unused coefficient, if it is out of its range.
     fn idle_violation(&self) -> Option<Violation> {
         match &self.wave_generator {
             WaveGeneratorFrictionDocument::Rolling(RollingDocument { coefficient: Some(coefficient), .. }) => {

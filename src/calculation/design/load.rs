@@ -18,13 +18,13 @@ use crate::key::{Encode, Encoder, encoded};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct MaterialsDocument {
-    /// Of the wave generator.
+    /// Material of the wave generator. Default: steel.
     pub wave_generator: MaterialDocument,
-    /// Of the teeth.
+    /// Material of the teeth. Default: steel.
     pub teeth: MaterialDocument,
-    /// Of the ring.
+    /// Material of the ring. Default: steel.
     pub ring: MaterialDocument,
-    /// Of the carrier.
+    /// Material of the carrier. Default: steel.
     pub carrier: MaterialDocument,
 }
 
@@ -32,10 +32,10 @@ pub struct MaterialsDocument {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct MaterialDocument {
-    /// Young's modulus E.
+    /// Young's modulus E, in GPa. Default: 210 GPa.
     #[schema(minimum = 1e-3, maximum = 1e5, default = 210.0)]
     pub youngs_modulus_gpa: f64,
-    /// Poisson's ratio ν.
+    /// Poisson's ratio ν. Default: 0.3.
     #[schema(exclusive_minimum = -1.0, exclusive_maximum = 0.5, default = 0.3)]
     pub poissons_ratio: f64,
 }
@@ -47,72 +47,75 @@ impl Default for MaterialDocument {
     }
 }
 
-/// The torque, at the wave generator or at the carrier, ring fixed, or a duty: exactly one of the three; and the stress that may be.
+/// Load and allowable stress. The load is exactly one of: torque at the wave generator, torque at the carrier, or duty;
+/// ring fixed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct LoadDocument {
-    /// Torque M0 at the wave generator.
+    /// Torque M0 at the wave generator, in N·m.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
     pub input_torque_nm: Option<f64>,
-    /// Torque at the carrier, losses neglected.
+    /// Torque at the carrier, in N·m, without losses.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
     pub output_torque_nm: Option<f64>,
-    /// The contact stress that the torque capacity is asked for, and above which a finding says so.
+    /// Allowable contact stress, in MPa, for the torque capacity. A finding reports if it is exceeded. Default: no
+    /// torque capacity.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub allowable_stress_mpa: Option<AllowableStressDocument>,
-    /// Speed of the wave generator; given `friction`, powers and sliding speeds follow from it. The points of a duty have their own.
+    /// Speed of the wave generator, in 1/min. With `friction` it gives powers and sliding speeds. The points of a duty
+    /// have their own speeds.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub input_speed_rpm: Option<f64>,
-    /// Several loads in turn, whose shares of the time add up to one.
+    /// Load spectrum: one to 100 loads, whose shares of the running time add up to one.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, min_items = 1, max_items = 100)]
     pub duty: Option<Vec<DutyPointDocument>>,
 }
 
-/// One load of a duty: exactly one torque, a speed, and how much of the running time it takes.
+/// One load of a duty: exactly one torque, a speed, and a share of the running time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct DutyPointDocument {
-    /// Torque M0 at the wave generator.
+    /// Torque M0 at the wave generator, in N·m.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
     pub input_torque_nm: Option<f64>,
-    /// Torque at the carrier, losses neglected.
+    /// Torque at the carrier, in N·m, without losses.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
     pub output_torque_nm: Option<f64>,
-    /// Speed of the wave generator.
+    /// Speed of the wave generator, in 1/min.
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub input_speed_rpm: f64,
-    /// Share of the running time.
+    /// Share of the running time, from 0 to 1.
     #[schema(minimum = 1e-9, maximum = 1.0)]
     pub share_of_time: f64,
 }
 
-/// The stress that the contacts may have: one number for all, or one for each.
+/// Allowable contact stress, in MPa: one number for all contacts, or one for each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AllowableStressDocument {
-    /// For all.
+    /// One stress for all contacts.
     Everywhere(f64),
-    /// For each.
+    /// One stress for each contact.
     ByContact(StressByContactDocument),
 }
 
-/// A stress for each contact, in MPa.
+/// Stress for each contact, in MPa.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct StressByContactDocument {
-    /// Between teeth and wave generator.
+    /// Between teeth and wave generator, in MPa.
     #[schema(minimum = 1e-3, maximum = 1e6)]
     pub wave_generator: f64,
-    /// Between teeth and ring.
+    /// Between teeth and ring, in MPa.
     #[schema(minimum = 1e-3, maximum = 1e6)]
     pub ring: f64,
-    /// Between teeth and carrier.
+    /// Between teeth and carrier, in MPa.
     #[schema(minimum = 1e-3, maximum = 1e6)]
     pub carrier: f64,
 }
@@ -126,7 +129,7 @@ impl Serialize for AllowableStressDocument {
     }
 }
 
-/// Told apart by what stands there, so that a fault keeps its place.
+/// Distinguishes number and object by the JSON type, so that an error keeps its location.
 impl<'de> Deserialize<'de> for AllowableStressDocument {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct NumberOrObject;
@@ -157,7 +160,7 @@ impl PartialSchema for AllowableStressDocument {
         let Range { low, high, .. } = Parameter::AllowableStress.range();
         let number = ObjectBuilder::new().schema_type(Type::Number).minimum(Some(low)).maximum(Some(high));
         OneOfBuilder::new()
-            .description(Some("The stress that the contacts may have: one number for all, or one for each."))
+            .description(Some("Allowable contact stress, in MPa: one number for all contacts, or one for each."))
             .item(number)
             .item(Ref::from_schema_name(StressByContactDocument::name()))
             .into()
@@ -185,7 +188,7 @@ impl From<AllowableStressDocument> for PerContact<f64> {
     }
 }
 
-/// A number or an object, never the one for the other.
+/// Encodes the kind too, so that a number and an object never have equal keys.
 impl Encode for AllowableStressDocument {
     fn encode(&self, encoder: &mut Encoder) {
         match self {

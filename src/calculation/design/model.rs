@@ -14,17 +14,17 @@ use crate::union::union;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct ModelDocument {
-    /// How the approaches at a tooth's contacts add up.
+    /// Compatibility: relation of the approaches at a tooth's contacts. Default: `virtual_work`.
     #[serde(default)]
     pub compatibility: CompatibilityDocument,
-    /// The contact law; left out, `hertz` of balls, of other teeth `johnson`, and `linear` beside `projection`.
+    /// Contact law. If left out: `hertz` for balls, `linear` for other teeth with `projection`, otherwise `johnson`.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub stiffness: Option<StiffnessDocument>,
-    /// What stands behind each contact and gives way too, with `virtual_work` alone.
+    /// Compliance of the supports, in series with each contact, in mm/N. Needs `virtual_work`. Default: 0 mm/N.
     #[serde(default)]
     pub series_compliance_mm_per_n: CompliancesDocument,
-    /// Which refinements the model has, with `virtual_work` alone.
+    /// Refinements of the model. Need `virtual_work`. Default: `auto`.
     #[serde(default)]
     pub refinements: RefinementsDocument,
     /// Use `refinements`. Overrides it for `ring_teeth_bend`.
@@ -39,49 +39,50 @@ pub struct ModelDocument {
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, deprecated)]
     pub corner_contact: Option<bool>,
-    /// Use `clearance_um` of the `parts`. A gap at a contact is given to the part that the teeth touch there, unless its parts have the same gap already.
+    /// Use `clearance_um` of the `parts`. A gap at a contact is assigned to the part that the teeth touch there, unless
+    /// `parts` already gives the same gap.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, deprecated)]
     pub clearance: Option<ClearanceDocument>,
 }
 
-/// Uniform gaps along the normals: a tooth carries load only where they are closed.
+/// Uniform gaps along the normals, in µm. A tooth carries load only if they are closed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct ClearanceDocument {
-    /// At the wave generator.
+    /// Gap at the wave generator, in µm. Default: 0 µm.
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub wave_generator_um: f64,
-    /// At the ring.
+    /// Gap at the ring, in µm. Default: 0 µm.
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub ring_um: f64,
-    /// At the carrier.
+    /// Gap at the carrier, in µm. Default: 0 µm.
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub carrier_um: f64,
 }
 
-/// How the approaches at a tooth's contacts add up to the rotation of the wave generator.
+/// Compatibility: relation of the approaches at a tooth's contacts to the rotation of the wave generator.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CompatibilityDocument {
-    /// The paper's: each projected on the direction of the wave generator's force.
+    /// The paper's form: each approach projected on the direction of the wave generator's force.
     Projection,
-    /// Virtual work: the frictionless solution for a tooth whose centre is free to move.
+    /// Virtual work: the frictionless solution for a tooth whose centre can move freely.
     #[default]
     VirtualWork,
 }
 
-/// A compliance for each contact, in mm/N.
+/// Compliance for each contact, in mm/N.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct CompliancesDocument {
-    /// At the wave generator.
+    /// At the wave generator, in mm/N. Default: 0 mm/N.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub wave_generator: f64,
-    /// At the ring.
+    /// At the ring, in mm/N. Default: 0 mm/N.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub ring: f64,
-    /// At the carrier.
+    /// At the carrier, in mm/N. Default: 0 mm/N.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub carrier: f64,
 }
@@ -89,54 +90,54 @@ pub struct CompliancesDocument {
 union! {
     /// The contact law.
     pub enum StiffnessDocument as "Stiffness" by "law" read "by:law" {
-        /// k = (π/2) L1 E* at each contact.
+        /// The paper's stiffness k = (π/2) L1 E* at each contact.
         Linear(LinearDocument) = "linear",
         /// Given stiffnesses.
         Fixed(FixedDocument) = "fixed",
-        /// Palmgren's law.
+        /// Palmgren's law for steel cylinders.
         Palmgren(PalmgrenDocument) = "palmgren",
-        /// Johnson's law.
+        /// Johnson's law for line contacts.
         Johnson(JohnsonDocument) = "johnson",
-        /// Hertz's law.
+        /// Hertz's law for balls.
         Hertz(HertzDocument) = "hertz",
     }
 }
 
-/// k = (π/2) L1 E* at each contact: several times too stiff, but the paper's.
+/// The paper's stiffness k = (π/2) L1 E* at each contact, several times too high.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct LinearDocument {}
 
-/// Given stiffnesses at the wave generator, the ring and the carrier.
+/// Given stiffnesses at the wave generator, the ring and the carrier, in N/mm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct FixedDocument {
-    /// At the wave generator.
+    /// Stiffness at the wave generator, in N/mm.
     #[schema(minimum = 1e-3, maximum = 1e15)]
     pub wave_generator_n_per_mm: f64,
-    /// At the ring.
+    /// Stiffness at the ring, in N/mm.
     #[schema(minimum = 1e-3, maximum = 1e15)]
     pub ring_n_per_mm: f64,
-    /// At the carrier.
+    /// Stiffness at the carrier, in N/mm.
     #[schema(minimum = 1e-3, maximum = 1e15)]
     pub carrier_n_per_mm: f64,
 }
 
-/// Palmgren's δ = 3.84e-5 F^0.9/L1^0.8 (N, mm), steel on steel.
+/// Palmgren's law δ = 3.84e-5 F^0.9/L1^0.8 (N, mm) for steel on steel.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct PalmgrenDocument {}
 
-/// The logarithmic approach of a cylinder between two bodies (Johnson, Contact Mechanics, section 5.6).
+/// Logarithmic approach of a cylinder between two bodies (Johnson, Contact Mechanics, section 5.6).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct JohnsonDocument {
-    /// How deep below each contact the body stands still; left out, the tooth's radius.
+    /// Depth below each contact at which the body is fixed, in mm. Default: the tooth's radius.
     #[serde(default)]
     pub depth_mm: LengthsByContactDocument,
 }
 
-/// Hertz's law of point contacts, δ = q F^(2/3): that of balls.
+/// Hertz's law of point contacts, δ = q F^(2/3), for balls.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct HertzDocument {}
@@ -159,19 +160,19 @@ impl From<&StiffnessDocument> for ContactLaw {
     }
 }
 
-/// A contact law.
+/// Name of a contact law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LawName {
-    /// `k = π L1 E*/2`.
+    /// The paper's `k = π L1 E*/2`.
     Linear,
     /// Given stiffnesses.
     Fixed,
-    /// Palmgren's.
+    /// Palmgren's law.
     Palmgren,
-    /// Johnson's.
+    /// Johnson's law.
     Johnson,
-    /// Hertz's.
+    /// Hertz's law.
     Hertz,
 }
 

@@ -1,4 +1,4 @@
-//! Parts made otherwise than conjugate on purpose.
+//! Modification: intentional differences of the parts from the conjugate shape.
 
 use serde::{Deserialize, Serialize};
 use toothwave_solver::Modification;
@@ -8,60 +8,61 @@ use utoipa::ToSchema;
 use super::number::given;
 use crate::key::encoded;
 
-/// Parts made otherwise than conjugate on purpose, all teeth alike, with `virtual_work` alone: each number opens a gap where it is positive.
-/// Angles are turned away from the flank under load.
+/// Modification: intentional differences of the parts from the conjugate shape, the same for all teeth, with
+/// `virtual_work` only. A positive value opens a gap. A positive angle is a rotation away from the flank under load.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct ModificationDocument {
-    /// The ring's profile set back along its normals.
+    /// Offset of the ring's profile along its normals, in µm. Default: 0 µm.
     #[serde(default)]
     #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub ring_equidistant_um: f64,
-    /// The path that generates the ring shifted outward along its radii.
+    /// Outward shift of the path that generates the ring, along its radii, in µm. Default: 0 µm.
     #[serde(default)]
     #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub ring_path_shift_um: f64,
-    /// The ring's profile moved outward along its own radii.
+    /// Outward shift of the ring's profile, along its own radii, in µm. Default: 0 µm.
     #[serde(default)]
     #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub ring_profile_shift_um: f64,
-    /// The ring's flanks turned about the axis.
+    /// Rotation of the ring's flanks about the axis, in arcsec. Default: 0 arcsec.
     #[serde(default)]
     #[schema(minimum = -1e5, maximum = 1e5, default = 0.0)]
     pub ring_rotation_arcsec: f64,
-    /// The wave generator set back along its normals.
+    /// Offset of the wave generator along its normals, in µm. Default: 0 µm.
     #[serde(default)]
     #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub wave_generator_equidistant_um: f64,
-    /// The slots' walls set back.
+    /// Offset of the slots' walls, in µm. Default: 0 µm.
     #[serde(default)]
     #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub slot_wall_um: f64,
-    /// The carrier turned about the axis.
+    /// Rotation of the carrier about the axis, in arcsec. Default: 0 arcsec.
     #[serde(default)]
     #[schema(minimum = -1e5, maximum = 1e5, default = 0.0)]
     pub carrier_rotation_arcsec: f64,
-    /// The teeth thinner in their radius.
+    /// Reduction of the teeth's radius, in µm. Default: 0 µm.
     #[serde(default)]
     #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub tooth_radius_um: f64,
-    /// The ring's flank set back towards its tip; left out, it has no relief.
+    /// Tip relief: offset of the ring's flank towards its tip. Default: no relief.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub ring_tip_relief: Option<TipReliefDocument>,
 }
 
-/// The ring's flank set back by C ((ψ - ψ_t)/(ψ_e - ψ_t))^n where the tooth stands beyond ψ_t; ψ_e is the flank's end.
+/// Tip relief: the flank is offset by C ((ψ - ψ_t)/(ψ_e - ψ_t))^n for tooth positions ψ above ψ_t. ψ_e is the flank's
+/// end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct TipReliefDocument {
-    /// C, at the flank's end.
+    /// Amount C at the flank's end, in µm.
     #[schema(minimum = -1e6, maximum = 1e6)]
     pub amount_um: f64,
-    /// ψ_t, the position where it starts, from the middle of the lobe; before the flank's end.
+    /// Start ψ_t: tooth position from the middle of the lobe, in deg. It must be before the flank's end.
     #[schema(minimum = 0.0, maximum = 180.0)]
     pub start_deg: f64,
-    /// n.
+    /// Power n.
     #[schema(minimum = 0.1, maximum = 100.0)]
     pub power: f64,
 }

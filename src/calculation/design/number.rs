@@ -1,14 +1,14 @@
-//! Numbers and absences, as documents have them.
+//! Numbers and optional fields of documents.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::key::{Encode, Encoder};
 
-/// A whole number of any size, spelled `28`, `28.0` or `2.8e1`.
+/// A whole number of any size, written as `28`, `28.0` or `2.8e1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whole(pub(super) f64);
 
-/// Without a point, as far as every reader can tell whole numbers apart.
+/// Writes an integer if it is small enough for every reader to be exact.
 impl Serialize for Whole {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         const MOST: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
@@ -17,17 +17,17 @@ impl Serialize for Whole {
 }
 
 impl Whole {
-    /// A small number as a document would have it.
+    /// Returns a small number, as in a document.
     pub const fn of(count: u32) -> Self {
         Self(count as f64)
     }
 
-    /// The number as it stands.
+    /// Returns the number.
     pub const fn value(self) -> f64 {
         self.0
     }
 
-    /// As the solver counts; what lies beyond that lies beyond every range too.
+    /// Returns the number as the solver's type. A number beyond it is beyond every range too.
     #[expect(clippy::cast_possible_truncation, reason = "whole, and saturating")]
     pub(super) const fn count(self) -> i64 {
         self.0 as i64
@@ -46,7 +46,7 @@ impl<'de> Deserialize<'de> for Whole {
     }
 }
 
-/// For fields that may be left out but not be null.
+/// Deserializes a field that may be left out but not be null.
 pub(super) fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
     T::deserialize(deserializer).map(Some)
 }

@@ -1,4 +1,4 @@
-//! What the model of load sharing takes into account beyond its contact law.
+//! Refinements of the load-sharing model beyond its contact law.
 
 use std::borrow::Cow;
 
@@ -11,7 +11,7 @@ use utoipa::{PartialSchema, ToSchema};
 use crate::json::ANY;
 use crate::key::encoded;
 
-/// A set of refinements, with `virtual_work` alone.
+/// A set of refinements. Needs `virtual_work`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Refinements {
     /// [`RefinementItem::RingTeethBend`].
@@ -26,7 +26,7 @@ impl Refinements {
     /// The empty set.
     pub const NONE: Self = Self { ring_teeth_bend: false, wave_generator_moves: false, corner_contact: false };
 
-    /// Those of both sets.
+    /// Returns the union of both sets.
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self {
@@ -37,12 +37,12 @@ impl Refinements {
     }
 }
 
-/// Which refinements a document asks for.
+/// Refinements in a document.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RefinementsDocument {
-    /// Whether those that follow from the geometry.
+    /// True if it includes the refinements that follow from the geometry.
     pub auto: bool,
-    /// These besides.
+    /// Refinements listed in addition.
     pub listed: Refinements,
 }
 
@@ -50,10 +50,10 @@ const AUTO: &str = "auto";
 const NONE: &str = "none";
 
 impl RefinementsDocument {
-    /// Those that follow from the geometry.
+    /// The refinements that follow from the geometry.
     pub const AUTO: Self = Self { auto: true, listed: Refinements::NONE };
 
-    /// These and no others.
+    /// Returns exactly these refinements.
     pub const fn only(listed: Refinements) -> Self {
         Self { auto: false, listed }
     }
@@ -65,18 +65,18 @@ impl Default for RefinementsDocument {
     }
 }
 
-/// An item of the list: a refinement, or those that follow from the geometry.
+/// Item of the list: a refinement, or those that follow from the geometry.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RefinementItem {
-    /// Those that follow from the geometry.
+    /// The refinements that follow from the geometry.
     Auto,
-    /// The ring's teeth bend, the more the nearer to their tips they are pressed.
+    /// The ring's teeth bend, more so the nearer to the tip the contact is.
     RingTeethBend,
-    /// The wave generator moves on under its teeth as it winds up; otherwise its lever arms are those without load.
+    /// The lever arms change as the wave generator winds up under its teeth. Otherwise they are those without load.
     WaveGeneratorMoves,
-    /// Teeth press against the corner of a pointed or bored tip before they reach the flank. States are listed from the valley on, and those at a corner
-    /// have no stress at the ring. Balls never do.
+    /// Teeth press against the corner of a pointed or bored tip before they reach the flank. States are then listed
+    /// from the valley on. At a corner the ring stress is not calculated. Balls never press against corners.
     CornerContact,
 }
 
@@ -154,9 +154,9 @@ impl PartialSchema for RefinementsDocument {
         let list = ArrayBuilder::new().items(Ref::from_schema_name(RefinementItem::name()));
         OneOfBuilder::new()
             .description(Some(
-                "Which refinements the model has: `auto`, `none`, or a list. `auto` follows from the geometry and not from the law: for cylinders under \
-                 `virtual_work` in a ring with pointed or bored tips it is `ring_teeth_bend`, with gaps also `wave_generator_moves`; elsewhere it is none. In a \
-                 list `auto` stands for these.",
+                "Refinements of the model: `auto`, `none`, or a list. `auto` depends on the geometry and not on the law. For \
+                 cylinders with `virtual_work` in a ring with pointed or bored tips it is `ring_teeth_bend`, with gaps \
+                 also `wave_generator_moves`. Otherwise it is `none`. In a list `auto` means these.",
             ))
             .item(word)
             .item(list)

@@ -1,4 +1,4 @@
-//! What a document means where it leaves a field out, or uses a deprecated one.
+//! Resolution of a document: defaults of fields that are left out, and deprecated fields.
 
 use toothwave_solver::drive::Draft;
 use toothwave_solver::violation::Modified;
@@ -12,32 +12,32 @@ use crate::field::{FieldCode, contact_name, pointer};
 use crate::json::Fault;
 use crate::key::Encode;
 
-/// How far the working surface of each part is set back.
+/// Clearance of each part: offset of its working surface.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ClearancesUm {
-    /// Of the parts that teeth touch.
+    /// Clearance of the parts that the teeth touch.
     pub by_contact: PerContact<f64>,
-    /// Of the teeth.
+    /// Clearance of the teeth.
     pub teeth: f64,
 }
 
 impl ClearancesUm {
-    /// The gap at each contact: the sum of its two parts' clearances.
+    /// Returns the gap at each contact: the sum of its two parts' clearances.
     pub fn gaps(&self) -> PerContact<f64> {
         PerContact::of(|contact| self.by_contact.get(contact) + self.teeth)
     }
 }
 
-/// A surface that a clearance sets back and a modification too.
+/// A surface that is offset by a clearance and by a modification.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SetBackTwice {
-    /// Whose.
+    /// Part with this surface.
     pub part: Part,
     /// The modification.
     pub modified: Modified,
-    /// By the clearance.
+    /// Offset by the clearance, in µm.
     pub clearance_um: f64,
-    /// By the modification.
+    /// Offset by the modification, in µm.
     pub modification_um: f64,
 }
 
@@ -55,7 +55,7 @@ pub enum DeprecatedField {
 }
 
 impl DeprecatedField {
-    /// JSON pointer to it.
+    /// Returns the JSON pointer of the field.
     pub const fn pointer(self) -> &'static str {
         match self {
             Self::Clearance => "/model/clearance",
@@ -65,7 +65,7 @@ impl DeprecatedField {
         }
     }
 
-    /// What takes its place.
+    /// Returns the field that replaces it.
     pub const fn replacement(self) -> &'static str {
         match self {
             Self::Clearance => "parts.*.clearance_um",
@@ -75,7 +75,7 @@ impl DeprecatedField {
 }
 
 impl Design {
-    /// The deprecated fields that say something.
+    /// Returns the deprecated fields that have an effect.
     pub fn deprecated_fields(&self) -> Vec<DeprecatedField> {
         let clearance = self.deprecated_gaps_um() != PerContact::default();
         let mut fields: Vec<_> = clearance.then_some(DeprecatedField::Clearance).into_iter().collect();
@@ -83,7 +83,7 @@ impl Design {
         fields
     }
 
-    /// The gaps of `model.clearance`.
+    /// Returns the gaps of `model.clearance`.
     fn deprecated_gaps_um(&self) -> PerContact<f64> {
         self.model.clearance.as_ref().map_or_else(PerContact::default, |clearance| PerContact {
             wave_generator: clearance.wave_generator_um,
@@ -92,7 +92,7 @@ impl Design {
         })
     }
 
-    /// The clearances of `parts` alone.
+    /// Returns the clearances of `parts` only.
     fn clearances_of_parts_um(&self) -> ClearancesUm {
         let parts = &self.parts;
         let by_contact = PerContact {
@@ -103,7 +103,8 @@ impl Design {
         ClearancesUm { by_contact, teeth: parts.teeth.clearance_um }
     }
 
-    /// The clearances of the parts. A gap of `model.clearance` is one of the part that the teeth touch there.
+    /// Returns the clearances of the parts. A gap of `model.clearance` is assigned to the part that the teeth touch
+    /// there.
     pub fn clearances_um(&self) -> ClearancesUm {
         let (mut clearances, deprecated) = (self.clearances_of_parts_um(), self.deprecated_gaps_um());
         let gaps = clearances.gaps();
@@ -115,7 +116,7 @@ impl Design {
         clearances
     }
 
-    /// The surfaces that two fields set back.
+    /// Returns the surfaces that are offset by two fields.
     pub fn set_back_twice(&self) -> impl Iterator<Item = SetBackTwice> + use<> {
         let (clearances, modification) = (self.clearances_um(), Modification::from(&self.modification));
         let PerContact { wave_generator, ring, carrier } = clearances.by_contact;
@@ -141,10 +142,10 @@ impl Design {
         })
     }
 
-    /// That `model.clearance` gives a contact another gap than `parts`.
+    /// Checks that `model.clearance` and `parts` do not give a contact different gaps.
     ///
     /// # Errors
-    /// The fault.
+    /// The conflict, as a fault.
     pub fn require_one_clearance(&self) -> Result<(), Fault> {
         let of_parts = self.clearances_of_parts_um().gaps();
         for (contact, &gap_um) in self.deprecated_gaps_um().iter() {
@@ -161,10 +162,10 @@ impl Design {
         Ok(())
     }
 
-    /// That deprecated switches stand beside nothing that says otherwise.
+    /// Checks that deprecated switches do not conflict with `refinements` or `projection`.
     ///
     /// # Errors
-    /// The fault.
+    /// The conflict, as a fault.
     pub fn require_one_choice_of_refinements(&self) -> Result<(), Fault> {
         let is_projection = self.model.compatibility == CompatibilityDocument::Projection;
         let is_chosen = self.model.refinements != RefinementsDocument::AUTO;
@@ -182,7 +183,7 @@ impl Design {
         Ok(())
     }
 
-    /// Every clearance that is out of its range.
+    /// Returns every clearance that is out of its range.
     pub fn clearance_violations(&self) -> Vec<Violation> {
         let ClearancesUm { by_contact, teeth } = self.clearances_of_parts_um();
         let of_parts = by_contact.iter().map(|(contact, &value)| (Parameter::PartClearance(contact.mate()), value));
@@ -192,14 +193,15 @@ impl Design {
         of_parts.chain(of_teeth).chain(deprecated).filter_map(|(parameter, value)| parameter.check(value)).collect()
     }
 
-    /// Whether any contact has a gap.
+    /// Returns true if any contact has a gap.
     fn has_gaps(&self) -> bool {
         self.clearances_um().gaps() != PerContact::default()
             || !Modification::from(&self.modification).is_nil()
             || !Deviations::from(&self.deviations).is_nil()
     }
 
-    /// What `auto` chooses under virtual work. Refinements of balls and of flat-sided teeth were not checked against elastic bodies.
+    /// Returns the choice of `auto` under virtual work. Refinements of balls and flat-sided teeth were not checked
+    /// against elastic bodies.
     fn refinements_by_geometry(&self, has_pointed_tips: bool) -> Refinements {
         let is_refined = has_pointed_tips && matches!(self.drive.teeth, TeethDocument::Cylinder(_));
         Refinements {
@@ -209,7 +211,8 @@ impl Design {
         }
     }
 
-    /// The refinements that are asked for, for a drive that has pointed or bored tips or not. `projection` takes none: a list beside it is refused.
+    /// Returns the requested refinements, for a drive with or without pointed or bored tips. A list with `projection`
+    /// is rejected elsewhere.
     fn refinements_of(
         &self,
         asked: RefinementsDocument,
@@ -224,24 +227,24 @@ impl Design {
         let ModelDocument { ring_teeth_bend, wave_generator_moves, corner_contact, .. } = self.model;
         Refinements {
             ring_teeth_bend: ring_teeth_bend.unwrap_or(refinements.ring_teeth_bend),
-            // Where teeth were told not to bend, nothing was ever chosen by the geometry.
+            // If bending is off, the geometry never chose any refinement.
             wave_generator_moves: wave_generator_moves
                 .unwrap_or(refinements.wave_generator_moves && ring_teeth_bend != Some(false)),
             corner_contact: corner_contact.unwrap_or(refinements.corner_contact),
         }
     }
 
-    /// The refinements of the model.
+    /// Returns the refinements of the model.
     pub fn refinements(&self, has_pointed_tips: bool) -> Refinements {
         self.refinements_of(self.model.refinements, self.model.compatibility, has_pointed_tips)
     }
 
-    /// The same under virtual work, whatever the document's compatibility.
+    /// Returns the refinements under virtual work, whatever the document's compatibility.
     pub fn refinements_by_virtual_work(&self, has_pointed_tips: bool) -> Refinements {
         self.refinements_of(self.model.refinements, CompatibilityDocument::VirtualWork, has_pointed_tips)
     }
 
-    /// The law of a document that names none: the one that holds best, and the paper's beside the paper's compatibility.
+    /// Returns the default contact law: the most accurate one, or the paper's law with the paper's compatibility.
     fn law_by_default(&self) -> StiffnessDocument {
         match (&self.drive.teeth, self.model.compatibility) {
             (TeethDocument::Ball(_), _) => StiffnessDocument::Hertz(HertzDocument::default()),
@@ -254,7 +257,7 @@ impl Design {
         }
     }
 
-    /// The contact law with all its numbers.
+    /// Returns the contact law with all its values.
     pub fn stiffness(&self) -> StiffnessDocument {
         let mut stiffness = self.model.stiffness.clone().unwrap_or_else(|| self.law_by_default());
         if let StiffnessDocument::Johnson(JohnsonDocument { depth_mm }) = &mut stiffness {
@@ -266,7 +269,7 @@ impl Design {
         stiffness
     }
 
-    /// The complete model, for a drive that has pointed or bored tips or not.
+    /// Returns the complete model, for a drive with or without pointed or bored tips.
     pub fn complete_model(&self, has_pointed_tips: bool) -> ModelDocument {
         ModelDocument {
             compatibility: self.model.compatibility,
@@ -277,7 +280,8 @@ impl Design {
         }
     }
 
-    /// The document with every default that follows from other fields, but for refinements that follow from the geometry.
+    /// Returns the document with every default that depends on other fields, except refinements that follow from the
+    /// geometry.
     pub fn with_defaults(mut self) -> Self {
         self.model.stiffness = Some(self.stiffness());
         self.model.clearance = self.clearance_in_key().cloned();
@@ -285,23 +289,24 @@ impl Design {
         self
     }
 
-    /// The parts as keys tell them apart.
+    /// Returns the parts for keys.
     pub(crate) fn parts_in_key(&self) -> impl Encode + '_ {
         (&self.parts, self.clearance_in_key())
     }
 
-    /// `model.clearance` where it says something.
+    /// Returns `model.clearance` if it has an effect.
     fn clearance_in_key(&self) -> Option<&ClearanceDocument> {
         self.model.clearance.as_ref().filter(|_| self.deprecated_gaps_um() != PerContact::default())
     }
 
-    /// The model as keys tell models apart: a default that is written out is the same as one that is left out. Deprecated fields stay, as answers name them.
+    /// Returns the model for keys. A default that is written out gives the same key as one that is left out. Deprecated
+    /// fields are kept, because answers name them.
     pub(crate) fn model_in_key(&self) -> ModelDocument {
         let mut model = self.model.clone();
         model.stiffness = Some(self.stiffness());
         model.clearance = self.clearance_in_key().cloned();
         let has_switch = model.switches().iter().any(|(_, is_on)| is_on.is_some());
-        // Only what is more than `auto` needs the geometry.
+        // Only refinements other than `auto` depend on the geometry.
         if model.refinements != RefinementsDocument::AUTO && !has_switch {
             let drive = Draft::new(&self.drive_parameters()).ok().and_then(|draft| draft.drive());
             let has_pointed_tips = drive.is_some_and(|drive| model_error::has_pointed_tips(&drive));
@@ -316,7 +321,7 @@ impl Design {
 }
 
 impl ModelDocument {
-    /// The deprecated switches.
+    /// Returns the deprecated switches.
     const fn switches(&self) -> [(DeprecatedField, Option<bool>); 3] {
         [
             (DeprecatedField::RingTeethBend, self.ring_teeth_bend),

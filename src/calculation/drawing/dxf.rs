@@ -1,7 +1,7 @@
 //! Drawings as DXF of AutoCAD 2000: the oldest with light polylines and declared units.
 //!
 //! Written here because the one library for it (crate dxf 0.6) leaves its tables without handles, which readers have to mend.
-//! Structure and group codes are those of Autodesk's DXF reference. docs/dxf.md lists what AutoCAD requires beyond what other
+//! Structure and group codes are those of Autodesk's DXF reference. docs/reference/dxf.md lists what AutoCAD requires beyond what other
 //! readers do, and which programs have opened these files.
 
 use std::io::{self, Write};

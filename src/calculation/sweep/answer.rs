@@ -1,4 +1,4 @@
-//! A sweep as it goes over the wire.
+//! Answer of a sweep.
 
 use serde::Serialize;
 use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, States, TorqueCapacity};
@@ -15,78 +15,81 @@ use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 use crate::sweep::model_error::ModelErrorAnswer;
 use crate::sweep::peak::PeakAnswer;
 
-/// Forces and contact stresses over one period: of one meshing zone where the zones are alike, elsewhere of all of them.
+/// Forces and contact stresses over one period: of one meshing zone if the zones are alike, otherwise of all zones.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SweepAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
-    /// The build that computed it: equal builds on equal processors give equal bytes.
+    /// Build of the program. Equal builds on equal processors give identical bytes.
     pub build: &'static str,
     /// Contact ratio ε, counted over all meshing zones.
     pub coincidence_degree: f64,
-    /// The input angle after which the load pattern repeats, where no item deviates.
+    /// Load period: input angle after which the load pattern repeats if no item deviates, in deg.
     pub period_deg: f64,
-    /// The input angle that the sweep goes over, given `deviations`: so many of these periods as it takes until the items that deviate meet
-    /// again as they did.
+    /// Input angle of the sweep, in deg, with `deviations`: the number of load periods after which all items are back
+    /// in their positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub sweep_period_deg: Option<f64>,
-    /// The load at both shafts.
+    /// Load at both shafts, without losses.
     pub load: LoadAnswer,
-    /// Whether a tooth takes load the moment it enters, because its flank ends before the place where its lever arm is zero: the
-    /// others' loads then jump.
+    /// True if a tooth takes load as soon as it enters, because its flank ends before its lever arm becomes zero. The
+    /// loads of the other teeth then jump.
     pub enters_under_load: bool,
-    /// The largest force and stress of each contact, over the states.
+    /// Largest force and stress of each contact, over the states.
     pub peaks: PeaksAnswer,
-    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
+    /// Number of teeth in mesh over the input angle: of one zone if the zones are alike, otherwise of all zones.
     pub teeth_in_mesh_per_zone: TeethInMeshAnswer,
-    /// How many of them carry load, over the input angles of the sweep: with clearance fewer.
+    /// Number of those teeth that carry load, over the input angles of the sweep; fewer with clearance.
     pub loaded_teeth_per_zone: TeethInMeshAnswer,
-    /// The states.
+    /// States: one for each input angle and tooth in mesh.
     pub states: StatesAnswer,
-    /// Wind-up and torsional stiffness, given `sweep.wind_up`.
+    /// Wind-up and torsional stiffness, with `sweep.wind_up`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wind_up: Option<WindUpAnswer>,
-    /// The torque capacity, given `load.allowable_stress_mpa`.
+    /// Torque capacity, with `load.allowable_stress_mpa`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub torque_capacity: Option<TorqueCapacityAnswer>,
-    /// The points of the duty, given `load.duty`: what stands beside it is of the one with the largest torque.
+    /// Results for the points of the duty, with `load.duty`. All other results are for the point with the largest
+    /// torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub duty: Option<DutyAnswer>,
-    /// What friction takes, given `friction`.
+    /// Friction losses, with `friction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub losses: Option<LossesAnswer>,
-    /// What the teeth push the wave generator aside with, in N, where no two lobes are loaded alike; elsewhere they balance each other.
+    /// Radial force of the teeth on the wave generator, in N. Left out if two or more lobes are loaded alike, because
+    /// the forces then balance.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub radial_force_n: Option<RadialForceAnswer>,
-    /// The complete model that was used: in the place of the document's `model` it gives the same answer.
+    /// The complete model that was used. As `model` of the document it gives the same answer.
     pub model: ModelDocument,
-    /// How far the model is off elastic bodies.
+    /// Error of the model compared with elastic bodies.
     pub model_error: ModelErrorAnswer,
-    /// What gives way behind the contacts, estimated from the document's `parts`, each a number for `model.series_compliance_mm_per_n`; nothing of it is in the
-    /// forces. Of parts that cannot be made, and of balls, there are none.
+    /// Estimated compliances of the supports, from the document's `parts`, each as a value for
+    /// `model.series_compliance_mm_per_n`. The forces do not include them. Empty for parts that cannot be made and for
+    /// balls.
     pub series_compliance_estimates: Vec<EstimateAnswer>,
-    /// How well the results fulfil what must hold.
+    /// Residuals of conditions that the results must meet.
     pub checks: ChecksAnswer,
-    /// What a designer should be told.
+    /// Findings for the designer.
     pub findings: Vec<FindingAnswer>,
 }
 
-/// The load as it is seen from either shaft, ring fixed, losses neglected.
+/// Load at both shafts, ring fixed, without losses.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct LoadAnswer {
-    /// At the wave generator.
+    /// Torque M0 at the wave generator, in N·m.
     pub input_torque_nm: f64,
-    /// At the carrier.
+    /// Torque at the carrier, in N·m.
     pub output_torque_nm: f64,
 }
 
-/// The peaks of each contact.
+/// Peaks of each contact.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct PeaksAnswer {
     /// Between tooth and wave generator.
@@ -97,103 +100,108 @@ pub struct PeaksAnswer {
     pub carrier: ContactPeaksAnswer,
 }
 
-/// The peaks of a contact.
+/// Peaks of a contact.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ContactPeaksAnswer {
-    /// Of its normal force, in N.
+    /// Peak of the normal force, in N.
     pub force_n: PeakAnswer,
-    /// Of its Hertz stress, in MPa.
+    /// Peak of the Hertz stress, in MPa.
     pub stress_mpa: PeakAnswer,
-    /// Half the width of the contact, in the plane of motion, where the stress has its peak.
+    /// Half the width of the contact in the plane of motion at the stress peak, in mm.
     pub half_width_mm: f64,
-    /// Half its length along the axis there, of a ball.
+    /// Half the length of the contact along the axis at the stress peak, in mm. Only for balls.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub half_length_mm: Option<f64>,
-    /// The largest shear stress below the surface there; left out under a flat, whose edges are not modelled.
+    /// Largest shear stress below the surface at the stress peak, in MPa. Left out for a flat, whose edges are not
+    /// modelled.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub shear_stress_mpa: Option<f64>,
-    /// How deep it stands.
+    /// Depth of that shear stress below the surface, in mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub shear_depth_mm: Option<f64>,
 }
 
-/// Columns of equal length: one entry for each input angle and tooth in mesh, by input angle, then tooth number.
+/// Columns of equal length with one entry for each input angle and tooth in mesh, by input angle, then tooth number.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct StatesAnswer {
-    /// Input angle j.
+    /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
-    /// Tooth number, from the middle of a lobe on; where zones are unlike, the number of its slot, slot 0 standing in the middle of lobe 0 at j = 0.
+    /// Tooth number, counted from the middle of a lobe. If zones are unlike, it is the slot number; slot 0 is in the
+    /// middle of lobe 0 at j = 0.
     pub tooth: Vec<u32>,
-    /// The lobe that the tooth is on, where zones are unlike and all of them are listed.
+    /// Lobe of the tooth. Only if zones are unlike, so that all of them are listed.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub lobe: Option<Vec<u32>>,
-    /// Position ψ of the tooth, from the middle of its lobe: the major axis of an ellipse.
+    /// Position ψ of the tooth, from the middle of its lobe (the major axis of an ellipse), in deg.
     pub position_deg: Vec<f64>,
-    /// Distance of the tooth's centre from the axis.
+    /// Distance of the tooth's centre from the axis, in mm.
     pub center_radius_mm: Vec<f64>,
-    /// φ_H: contact on the wave generator, from the valley before its lobe: the minor axis of an ellipse.
+    /// Angle φ_H of the contact on the wave generator, from the valley before its lobe (the minor axis of an ellipse),
+    /// in deg.
     pub wave_generator_angle_deg: Vec<f64>,
-    /// φ_K: contact on the ring, from the ring's tooth tip.
+    /// Angle φ_K of the contact on the ring, from the tip of the ring's tooth, in deg.
     pub ring_angle_deg: Vec<f64>,
-    /// Force F_H between tooth and wave generator.
+    /// Force F_H between tooth and wave generator, in N.
     pub force_wave_generator_n: Vec<f64>,
-    /// Force F_K between tooth and ring.
+    /// Force F_K between tooth and ring, in N.
     pub force_ring_n: Vec<f64>,
-    /// Force F_S between tooth and carrier.
+    /// Force F_S between tooth and carrier, in N.
     pub force_carrier_n: Vec<f64>,
-    /// Hertz stress σ_H between tooth and wave generator.
+    /// Hertz stress σ_H between tooth and wave generator, in MPa.
     pub stress_wave_generator_mpa: Vec<f64>,
-    /// Hertz stress σ_K between tooth and ring; 0 at a corner (`corner_contact`), of which none is told.
+    /// Hertz stress σ_K between tooth and ring, in MPa. It is 0 at a corner (`corner_contact`), where it is not
+    /// calculated.
     pub stress_ring_mpa: Vec<f64>,
-    /// Hertz stress σ_S between tooth and carrier.
+    /// Hertz stress σ_S between tooth and carrier, in MPa.
     pub stress_carrier_mpa: Vec<f64>,
-    /// Whether the tooth carries load, where there are gaps or `corner_contact`.
+    /// True if the tooth carries load. Only with gaps or `corner_contact`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub loaded: Option<Vec<bool>>,
 }
 
-/// What holds for all teeth at an input angle, in columns of equal length: one entry an input angle.
+/// Quantities of all teeth together, in columns of equal length with one entry for each input angle.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct WindUpAnswer {
-    /// Range of the wind-up over the period, at the output.
+    /// Transmission error, peak to peak: range of the wind-up over the period, at the output, in deg.
     pub transmission_error_peak_to_peak_deg: f64,
-    /// The same without load, where there are gaps.
+    /// Transmission error without load, peak to peak, in deg. Only with gaps.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub unloaded_transmission_error_peak_to_peak_deg: Option<f64>,
-    /// Input angle j.
+    /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
-    /// How far the wave generator turns under the load, carrier held, clearances included.
+    /// Wind-up: rotation of the wave generator under the load, carrier held, clearances included, in deg.
     pub wind_up_deg: Vec<f64>,
-    /// How far it turns before the first tooth has closed its gaps, where there are any: the wind-up as the torque goes to nothing.
+    /// Wind-up without load, in deg: rotation until the first tooth has closed its gaps. Only with gaps.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub unloaded_wind_up_deg: Option<Vec<f64>>,
-    /// Output torque over output rotation at the load, wave generator held.
+    /// Torsional stiffness, in N·m/rad: output torque over output rotation at the load, wave generator held.
     pub torsional_stiffness_nm_per_rad: Vec<f64>,
-    /// Teeth that carry load: of one zone where the zones are alike, elsewhere of all that `states` lists.
+    /// Number of teeth that carry load: of one zone if the zones are alike, otherwise of all teeth that `states` lists.
     pub loaded_teeth: Vec<u32>,
 }
 
-/// The largest torque under which no contact exceeds the allowable stress, over the input angles of the sweep.
+/// Torque capacity: largest torque under which no contact exceeds the allowable stress, over the input angles of the
+/// sweep.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct TorqueCapacityAnswer {
-    /// At the wave generator.
+    /// Torque at the wave generator, in N·m.
     pub input_torque_nm: f64,
-    /// At the carrier.
+    /// Torque at the carrier, in N·m.
     pub output_torque_nm: f64,
-    /// The contact that limits it; where `turns_past_teeth`, the one that is nearest to its allowable stress.
+    /// The contact that limits the torque. With `turns_past_teeth`, the contact nearest to its allowable stress.
     pub limited_by: ContactName,
-    /// Whether no contact reaches its stress under any torque that the teeth carry: the wave generator moves on, and beyond this torque would turn past them.
-    /// Left out where it does not.
+    /// True if no contact reaches its stress: at a larger torque the wave generator would rotate past the teeth. Left
+    /// out if false.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub turns_past_teeth: bool,
-    /// The input angle where it is so.
+    /// Input angle of the limit, in deg.
     pub input_angle_deg: f64,
 }
 
@@ -224,12 +232,12 @@ impl From<TorqueCapacity> for TorqueCapacityAnswer {
     }
 }
 
-/// How well the results fulfil what must hold.
+/// Residuals of conditions that the results must meet.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ChecksAnswer {
-    /// Largest relative deviation of the input, ring and carrier torques, over the input angles.
+    /// Largest relative deviation of the input, ring and carrier torques from equilibrium, over the input angles.
     pub torque_balance_residual: f64,
-    /// Largest difference of a load at the last input angle from that angle worked out anew, over the column's peak.
+    /// Largest difference of a load at the last input angle from its independent recalculation, over the column's peak.
     pub period_closure_residual: f64,
 }
 

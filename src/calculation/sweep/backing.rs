@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use crate::json::word;
 use crate::sweep::contact::ContactName;
 
-/// An estimate of what gives way behind a contact (docs/theory.md section 4.10).
+/// An estimate of what gives way behind a contact (docs/explanation/theory.md section 4.10).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct EstimateAnswer {
     /// The contact.

@@ -11,7 +11,7 @@ use crate::design::{CompatibilityDocument, LawName};
 use crate::json::word;
 
 /// The expected error of the model, numerical ones apart: how far it was off elastic bodies, calculated by finite elements, in drives
-/// of the same case (docs/validation.md).
+/// of the same case (docs/explanation/validation.md).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ModelErrorAnswer {
     /// The errors of the case; left out where nothing was measured of the law.

@@ -1,4 +1,4 @@
-//! `toothwave batch`: many designs, one a line, on all cores.
+//! `toothwave batch`: one design document a line, computed on all cores.
 
 use std::fs::File;
 use std::io::{self, BufRead, Write as _};
@@ -10,7 +10,7 @@ use super::Failure;
 use super::offline::{OFFLINE, log_errors, print, progress_bar};
 use crate::http::endpoints::batch::{BatchEnd, BatchQuery, computed_line};
 
-/// Lines that are answered before the first of them is written: few if answers are whole, because they are long.
+/// Lines that are computed before the first of them is written. Whole answers are long, so there are few.
 const fn lines_at_once(query: BatchQuery, cores: usize) -> usize {
     if query.peaks_only { 256 * cores } else { 2 * cores }
 }

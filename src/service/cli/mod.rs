@@ -1,4 +1,4 @@
-//! The command line: the service, the same answers without it, and what containers need.
+//! The command line: the service, the same answers without a server, and helpers for containers.
 
 mod batch;
 mod offline;
@@ -34,12 +34,12 @@ use crate::ops::config::Settings;
 use crate::ops::{keys, log};
 use offline::{FORMATS, PARTS, answer, one_of, print, read};
 
-/// The exit status of bad input, as most tools have it.
+/// Exit status for bad input: 2, as in most tools.
 const EXIT_BAD_INPUT: u8 = 2;
 
 /// Forces and contact stresses of discrete-tooth harmonic drives.
 #[derive(Debug, Parser)]
-#[command(name = "toothwave", version)]
+#[command(name = "toothwave", version, after_help = "Example: toothwave sweep design.json")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -47,50 +47,59 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Serve over HTTP; the default if no command is given
+    /// Serve over HTTP; the default without a command
+    #[command(after_help = "Example: toothwave serve --listen 127.0.0.1:8080 --studies studies.db")]
     Serve(Box<Settings>),
-    /// Profiles of the mating parts
+    /// Compute the profiles of the mating parts
+    #[command(after_help = "Example: toothwave geometry design.json")]
     Geometry(Offline),
-    /// How many teeth share the load
+    /// Compute the contact ratio (coincidence degree): how many teeth share the load
+    #[command(after_help = "Example: toothwave coincidence-degree design.json")]
     CoincidenceDegree(Offline),
-    /// Forces and contact stresses over one period
+    /// Compute forces and contact stresses over one period
+    #[command(after_help = "Example: toothwave sweep design.json --format csv > states.csv")]
     Sweep(Offline),
-    /// Each way of computing a design, with its error and its time
+    /// Measure the error and the time of each computation method for a design
+    #[command(after_help = "Example: toothwave accuracy design.json")]
     Accuracy(Offline),
-    /// A part, or all of them, as DXF, STEP, SVG, 3MF or STL
+    /// Write one part, or the assembly, as DXF, STEP, SVG, 3MF or STL
+    #[command(after_help = "Example: toothwave draw ring design.json --format dxf > ring.dxf")]
     Draw {
-        /// Which part
+        /// The part
         #[arg(value_parser = one_of(&PARTS))]
         part: DrawnPart,
         /// A design document, or `-` for standard input
         file: PathBuf,
-        /// Form of the answer
+        /// Format of the drawing
         #[arg(long, value_parser = one_of(&FORMATS), default_value = "dxf")]
         format: Format,
         /// Set each `parts.*.clearance_um` to 50, so that each contact has a gap of 0.1 mm
         #[arg(long)]
         printing: bool,
     },
-    /// Many designs, one a line, on all cores; answers come as NDJSON in their order
+    /// Compute many designs, one a line, on all cores; write the answers as NDJSON in the same order
+    #[command(after_help = "Example: toothwave batch designs.ndjson --peaks-only > answers.ndjson")]
     Batch {
-        /// Design documents, one a line, or `-` for standard input
+        /// File with one design document a line, or `-` for standard input
         file: PathBuf,
-        /// What each is asked
+        /// Calculation for every document
         #[arg(long, value_enum, default_value_t = BatchEndpoint::Sweep)]
         endpoint: BatchEndpoint,
-        /// Of sweeps, the peaks without the states
+        /// For sweeps: write the peaks, without the states
         #[arg(long)]
         peaks_only: bool,
     },
-    /// Many variants of one design, on all cores: a map, a search, a sensitivity or a tolerance study
+    /// Compute many variants of one design on all cores: map, search, sensitivity or tolerance study
+    #[command(after_help = "Example: toothwave study study.json --format csv > result.csv")]
     Study {
         /// A study document, or `-` for standard input
         file: PathBuf,
-        /// Form of the answer
+        /// Format of the answer
         #[arg(long, value_parser = one_of(&FORMATS), default_value = "json")]
         format: Format,
     },
     /// Print a document without its deprecated fields
+    #[command(after_help = "Example: toothwave convert old.json > new.json")]
     Convert {
         /// A design document or a study document, or `-` for standard input
         file: PathBuf,
@@ -101,17 +110,20 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         _any: Vec<OsString>,
     },
-    /// Ask a running service whether it is healthy; exit status 0 if so
+    /// Check that a running service answers; exit status 0 if it does
+    #[command(after_help = "Example: toothwave health --address 127.0.0.1:8080")]
     Health {
-        /// Where it listens
+        /// Address and port of the service
         #[arg(long, env = "TOOTHWAVE_LISTEN", value_name = "ADDR", default_value = "127.0.0.1:8080")]
         address: SocketAddr,
     },
     /// Print the API document
+    #[command(after_help = "Example: toothwave openapi > openapi.json")]
     Openapi,
-    /// Make a key: prints it once, with its line for the keys file
+    /// Make a key: print it once, with its line for the keys file
+    #[command(after_help = "Example: toothwave new-key 'drawing office'")]
     NewKey {
-        /// The name of its holder
+        /// Name of the key's owner
         name: String,
     },
 }
@@ -120,17 +132,17 @@ enum Command {
 struct Offline {
     /// A design document, or `-` for standard input
     file: PathBuf,
-    /// Form of the answer, if it has this one; `table` means `text`
+    /// Format of the answer; `table` is the same as `text`
     #[arg(long, value_parser = one_of(&FORMATS), default_value = "text")]
     format: Format,
 }
 
-/// Why a command failed.
+/// Reason for the failure of a command.
 #[derive(Debug)]
 enum Failure {
-    /// The document, or a setting, is at fault.
+    /// The document or a setting is wrong.
     BadInput(String),
-    /// The machine is: a file, a socket, a thread.
+    /// A file, a socket or a thread failed.
     Io(io::Error),
 }
 
@@ -143,7 +155,7 @@ impl From<io::Error> for Failure {
 impl From<Problem> for Failure {
     fn from(problem: Problem) -> Self {
         note_problem(&problem);
-        // The limits of the command line are fixed: it has no settings of these names.
+        // The command line has fixed limits and no settings of these names.
         let limits = ["`max_states`", "`max_profile_points`", "`max_study_variants`", "`max_study_bytes`"];
         let text = limits.iter().fold(problem.to_string(), |text, limit| text.replace(limit, "the command line"));
         match problem.cause {
@@ -153,7 +165,7 @@ impl From<Problem> for Failure {
     }
 }
 
-/// Runs the command that the process was started with.
+/// Runs the command in the arguments of this process.
 pub fn run() -> ExitCode {
     let cli = Cli::parse_from(arguments());
     let result = match cli.command {
@@ -190,21 +202,18 @@ fn complain(what: &dyn std::fmt::Display, status: ExitCode) -> ExitCode {
     status
 }
 
-/// A text without control characters for a terminal: it may quote a document that somebody else wrote.
+/// Escapes control characters for a terminal. The text may quote a document from someone else.
 fn printable(text: &str) -> String {
-    let mut printable = String::with_capacity(text.len());
-    for character in text.chars() {
-        if character.is_control() && character != '\n' {
-            printable.extend(character.escape_default());
-        } else {
-            printable.push(character);
-        }
-    }
-    printable
+    let escaped = |character: char| match character {
+        '\n' => character.to_string(),
+        _ if character.is_control() => character.escape_default().to_string(),
+        _ => character.to_string(),
+    };
+    text.chars().map(escaped).collect()
 }
 
-/// The arguments of this process, with the command `serve` if none is given. Settings are read for that command alone, so that a fault in
-/// the environment does not stop the others.
+/// Returns the arguments of this process, with the command `serve` if there is no command. Only `serve` reads the
+/// settings, so a wrong environment variable does not stop other commands.
 fn arguments() -> Vec<OsString> {
     let mut arguments: Vec<_> = std::env::args_os().collect();
     let names_command = arguments.get(1).is_some_and(|first| {
@@ -220,16 +229,16 @@ fn arguments() -> Vec<OsString> {
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
     let _written_at_end = log::start(filter);
-    // The allocator asks for pages of 2 MiB, and clearing one for each answer of 80 KB takes a sixth of its time.
+    // With transparent huge pages, clearing 2 MiB for each answer of 80 KB takes a sixth of its time.
     #[cfg(target_os = "linux")]
     let _ = rustix::thread::disable_transparent_huge_pages(true);
     let runtime = Builder::new_multi_thread().enable_all().build()?;
     let result = runtime.block_on(async {
-        // A log file that reached its size limit is then an error like others, instead of the end of the process.
+        // With this handler, a log file at its size limit is an I/O error and does not kill the process.
         let _ignored = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()))?;
         server::serve(settings).await
     });
-    // A computation that runs past its bound must not hold up the exit.
+    // A computation after its time limit must not delay the exit.
     runtime.shutdown_background();
     Ok(result?)
 }
@@ -241,7 +250,7 @@ fn convert(file: &Path) -> Result<(), Failure> {
 
 fn new_key(name: &str) -> Result<(), Failure> {
     if name.contains(char::is_control) {
-        return Err(Failure::BadInput("the name of a key is one line of text".into()));
+        return Err(Failure::BadInput("the name contains a control character. Use one line of text".into()));
     }
     let (key, line) = keys::new_key(name).map_err(io::Error::other)?;
     print(|writer| writeln!(writer, "key, for its holder:        {key}\nline, for the keys file:    {line}"))
@@ -250,7 +259,7 @@ fn new_key(name: &str) -> Result<(), Failure> {
 fn health(mut address: SocketAddr) -> Result<(), Failure> {
     const TIMEOUT: Duration = Duration::from_secs(2);
     if address.ip().is_unspecified() {
-        // A service that listens on all addresses listens on this one too.
+        // A service on all addresses also listens on the loopback address.
         address.set_ip(if address.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() });
     }
     let connected = TcpStream::connect_timeout(&address, TIMEOUT);
@@ -260,5 +269,9 @@ fn health(mut address: SocketAddr) -> Result<(), Failure> {
     write!(stream, "GET /health/live HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n")?;
     let mut head = [0; 12];
     stream.read_exact(&mut head)?;
-    if head == *b"HTTP/1.1 200" { Ok(()) } else { Err(io::Error::other("the service is not healthy").into()) }
+    if head == *b"HTTP/1.1 200" {
+        Ok(())
+    } else {
+        Err(io::Error::other("the service is not healthy. Read its log").into())
+    }
 }

@@ -1,4 +1,4 @@
-//! One document, one answer, without a server.
+//! Answers one document without a server.
 
 use std::fs::File;
 use std::io::{self, Read as _, Write};
@@ -15,10 +15,10 @@ use toothwave_calculation::question::{Limits, Question};
 use super::Failure;
 use crate::http::problem::Problem;
 
-/// Without a server only memory limits what is computed: some two gigabytes of it.
+/// Limits without a server: about 2 GB of memory.
 pub(super) const OFFLINE: Limits = Limits::new(20_000_000, 20_000_000);
 
-/// A choice on the command line: its word, another word for it, and what it means.
+/// A value of a command-line option: its word, an alias, and its help text.
 pub(super) struct Choice<T> {
     value: T,
     word: &'static str,
@@ -31,28 +31,28 @@ const fn choice<T>(value: T, word: &'static str, help: &'static str) -> Choice<T
 }
 
 pub(super) const FORMATS: [Choice<Format>; 11] = [
-    choice(Format::Json, "json", "As programs read it"),
-    choice(Format::Csv, "csv", "Columns"),
+    choice(Format::Json, "json", "For programs"),
+    choice(Format::Csv, "csv", "Columns as comma-separated values"),
     choice(Format::CsvComma, "csv-comma", "Columns with a decimal comma, semicolons between them"),
     choice(Format::Arrow, "arrow", "Columns as an Apache Arrow stream"),
     choice(Format::Parquet, "parquet", "Columns as an Apache Parquet file"),
-    Choice { value: Format::Text, word: "text", alias: Some("table"), help: "For a terminal" },
-    choice(Format::Svg, "svg", "A picture"),
-    choice(Format::Dxf, "dxf", "Outlines for CAD and workshops"),
+    Choice { value: Format::Text, word: "text", alias: Some("table"), help: "Summary for a terminal" },
+    choice(Format::Svg, "svg", "Image"),
+    choice(Format::Dxf, "dxf", "Outlines for CAD and manufacturing"),
     choice(Format::Step, "step", "Solids for CAD"),
     choice(Format::ThreeMf, "3mf", "Meshes for printers"),
     choice(Format::Stl, "stl", "One mesh for printers that read no 3MF"),
 ];
 
 pub(super) const PARTS: [Choice<DrawnPart>; 5] = [
-    choice(DrawnPart::Ring, "ring", "The ring, x along the middle of a tooth space"),
-    choice(DrawnPart::WaveGenerator, "wave-generator", "The wave generator, x along its major axis"),
-    choice(DrawnPart::Carrier, "carrier", "The carrier, x along a slot"),
-    choice(DrawnPart::Tooth, "tooth", "A tooth"),
-    choice(DrawnPart::Assembly, "assembly", "All parts in the ring's frame, at the document's input angle"),
+    choice(DrawnPart::Ring, "ring", "The ring; x runs through the middle of a tooth space"),
+    choice(DrawnPart::WaveGenerator, "wave-generator", "The wave generator; x is its major axis"),
+    choice(DrawnPart::Carrier, "carrier", "The carrier; x runs along a slot"),
+    choice(DrawnPart::Tooth, "tooth", "One tooth"),
+    choice(DrawnPart::Assembly, "assembly", "All parts at the document's input angle, in the ring's frame"),
 ];
 
-/// Reads one of these words.
+/// Returns a parser that accepts the words of these choices.
 pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
     choices: &'static [Choice<T>],
 ) -> impl TypedValueParser<Value = T> {
@@ -76,7 +76,7 @@ pub(super) fn log_errors() {
     tracing_subscriber::fmt().with_max_level(tracing::Level::ERROR).with_writer(io::stderr).init();
 }
 
-/// The bytes of a file, or of standard input.
+/// Reads a file, or standard input for `-`.
 pub(super) fn read(file: &Path) -> Result<Vec<u8>, Failure> {
     let mut text = Vec::new();
     if file.as_os_str() == "-" {
@@ -89,7 +89,7 @@ pub(super) fn read(file: &Path) -> Result<Vec<u8>, Failure> {
     Ok(text)
 }
 
-/// Checks that an answer has this form.
+/// Checks that the answer type has this format.
 pub(super) fn require_form<A: Forms>(format: Format) -> Result<(), Failure> {
     let known: Vec<_> = iter::once(Format::Json).chain(A::FORMS.iter().map(|(format, _)| *format)).collect();
     if known.contains(&format.offered()) {
@@ -97,18 +97,18 @@ pub(super) fn require_form<A: Forms>(format: Format) -> Result<(), Failure> {
     }
     let name = |format: &Format| FORMATS.iter().find(|choice| choice.value == *format).map_or("", |choice| choice.word);
     let names: Vec<_> = known.iter().map(name).collect();
-    Err(Failure::BadInput(format!("this answer has no form `{}`; choose one of {}", name(&format), names.join(", "))))
+    Err(Failure::BadInput(format!("this answer has no format `{}`. Use one of: {}", name(&format), names.join(", "))))
 }
 
 pub(super) fn print_answer(answer: &impl Forms, format: Format) -> Result<(), Failure> {
     print(|writer| {
         answer.write(format, writer)?;
-        // The other formats end their last line themselves.
+        // The other formats end with a line break.
         if format == Format::Json { writeln!(writer) } else { Ok(()) }
     })
 }
 
-/// Writes to standard output; a reader that has seen enough is no failure.
+/// Writes to standard output. A closed pipe is not an error.
 pub(super) fn print(
     write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io::Result<()>,
 ) -> Result<(), Failure> {
@@ -119,7 +119,7 @@ pub(super) fn print(
     }
 }
 
-/// A progress bar on standard error, if that is a terminal.
+/// Returns a progress bar. It is visible only if standard error is a terminal.
 pub(super) fn progress_bar() -> ProgressBar {
     ProgressBar::new(0).with_style(
         ProgressStyle::with_template("{bar:40} {percent}% {msg}, {elapsed} elapsed, {eta} left")

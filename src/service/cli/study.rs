@@ -1,4 +1,4 @@
-//! `toothwave study`: many variants of one design, on all cores.
+//! `toothwave study`: many variants of one design, computed on all cores.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use super::Failure;
 use super::offline::{OFFLINE, log_errors, print_answer, progress_bar, read, require_form};
 use crate::http::problem::Problem;
 
-/// Without a server only memory limits what is computed.
+/// Limits without a server: 8 GiB of results.
 const OFFLINE_STUDY: toothwave_study::Limits =
     toothwave_study::Limits { calculation: OFFLINE, max_study_variants: 1_000_000_000, max_study_bytes: 8 << 30 };
 
@@ -25,7 +25,7 @@ pub(super) fn run(file: &Path, format: Format) -> Result<(), Failure> {
     progress.set_length(study.variants());
     let gathered = Mutex::new(Gathered::new(&study));
     (0..study.chunks()).into_par_iter().for_each(|chunk| {
-        // Nothing sets this flag, so the chunk always has a part.
+        // The stop flag is never set, so every chunk has a part.
         let Ok(part) = Work::new(&study, chunk).run(&AtomicBool::new(false)) else { return };
         let mut gathered = gathered.lock();
         gathered.add(chunk, part);

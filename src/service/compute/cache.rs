@@ -1,7 +1,7 @@
-//! Caches finished answers, by a hash of the parameters that they follow from.
+//! The cache of finished answers. The key is a hash of the parameters of the answer.
 //!
-//! **Cache.** Answers are weighed in bytes; bodies up to 1 MiB are cached. Requests that ask the same at the same time share one
-//! computation, which goes on until the last of them has left.
+//! **Cache.** Entries are weighed in bytes; bodies up to 1 MiB are cached. Simultaneous requests with the same key
+//! share one computation (single flight). It runs until the last of them has left.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -22,26 +22,26 @@ use crate::http::problem::Problem;
 /// Largest body that is cached.
 pub const MAX_BODY_BYTES: usize = 1 << 20;
 
-/// What an entry takes beside its body.
+/// Bytes of an entry in addition to its body.
 const ENTRY_OVERHEAD_BYTES: usize = 640;
 
-/// Request texts whose key is remembered: one takes some 360 bytes.
+/// Request texts whose key is remembered. One takes about 360 bytes.
 const MAX_REMEMBERED_REQUESTS: u64 = 65_536;
 
 /// A finished answer.
 #[derive(Debug, Clone)]
 pub struct Answer {
-    /// The body, encoded as its representation says.
+    /// The body, encoded in its representation.
     pub body: Bytes,
-    /// What the body has reserved; nothing for a small one, or one from the cache.
+    /// The reservation of the body. A small body and a body from the cache have none.
     pub reservation: Option<Arc<Reservation>>,
-    /// How long computing took.
+    /// Time of the computation.
     pub solve: Duration,
-    /// The same as a header, made once for all requests.
+    /// The header `Server-Timing` with that time, made once for all requests.
     pub server_timing: HeaderValue,
 }
 
-/// How a request came to its answer.
+/// Source of the answer to a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CacheStatus {
     /// From the cache.
@@ -53,7 +53,7 @@ pub enum CacheStatus {
 }
 
 impl CacheStatus {
-    /// The value of the header `Cache-Status` (RFC 9211).
+    /// Returns the value of the header `Cache-Status` (RFC 9211).
     pub const fn header(self) -> &'static str {
         match self {
             Self::Hit => "toothwave; hit",
@@ -62,7 +62,7 @@ impl CacheStatus {
         }
     }
 
-    /// The label of metrics.
+    /// Returns the label for metrics.
     pub const fn label(self) -> &'static str {
         match self {
             Self::Hit => "hit",
@@ -72,12 +72,12 @@ impl CacheStatus {
     }
 }
 
-/// The hash of a request's text: equal texts need not be read twice.
+/// The hash of a request body. An equal body is not parsed again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct RequestHash([u8; 32]);
 
 impl RequestHash {
-    /// Of a body sent to an endpoint for one representation.
+    /// Hashes a body with its endpoint and representation.
     pub fn new(endpoint: &str, representation: Representation, body: &[u8]) -> Self {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&[representation.format as u8, u8::from(representation.gzip)]);
@@ -88,10 +88,11 @@ impl RequestHash {
 
 type Outcome = Result<Answer, Problem>;
 
-/// Answers that are being computed, each with a number of its own. The requests that wait for one own it.
+/// Running computations by key, owned by the requests that wait for them. The number tells a computation from a later
+/// one of the same key, so that the end of the first does not remove the second.
 type Flights = Arc<Mutex<HashMap<Key, (u64, WeakShared<BoxFuture<'static, Outcome>>)>>>;
 
-/// Finished answers, and those that are being computed; clones share them.
+/// Finished answers and running computations. Clones share them.
 #[derive(Debug, Clone)]
 pub struct Cache {
     answers: moka::sync::Cache<Key, Answer>,
@@ -99,7 +100,7 @@ pub struct Cache {
     flights: Flights,
 }
 
-/// Removes a computation from the list when it ends or is dropped.
+/// Removes a running computation from the map when it ends or is dropped.
 struct RemoveOnDrop {
     flights: Flights,
     key: Key,
@@ -116,7 +117,7 @@ impl Drop for RemoveOnDrop {
 }
 
 impl Cache {
-    /// A cache of at most this many bytes.
+    /// Makes a cache of at most this many bytes.
     pub fn new(max_bytes: u64) -> Self {
         let weight = |answer: &Answer| u32::try_from(answer.body.len() + ENTRY_OVERHEAD_BYTES).unwrap_or(u32::MAX);
         let answers = moka::sync::Cache::builder().max_capacity(max_bytes).weigher(move |_, answer| weight(answer));
@@ -124,28 +125,28 @@ impl Cache {
         Self { answers: answers.build(), keys, flights: Flights::default() }
     }
 
-    /// Bytes and number of the cached answers.
+    /// Returns the bytes and the number of cached answers.
     pub fn size(&self) -> (u64, u64) {
         self.answers.run_pending_tasks();
         (self.answers.weighted_size(), self.answers.entry_count())
     }
 
-    /// The cached answer of a key.
+    /// Returns the cached answer of a key.
     pub fn get(&self, key: Key) -> Option<Answer> {
         self.answers.get(&key)
     }
 
-    /// The key of a request text that was answered before.
+    /// Returns the key of a request body that was answered before.
     pub fn key(&self, request: RequestHash) -> Option<Key> {
         self.keys.get(&request)
     }
 
-    /// Remembers the key of a request text that was answered.
+    /// Stores the key of a request body.
     pub fn remember(&self, request: RequestHash, key: Key) {
         self.keys.insert(request, key);
     }
 
-    /// The answer of a key: cached, or computed once for all requests that wait for it.
+    /// Returns the cached answer of a key, or computes it once for all requests that wait for it.
     pub async fn get_or_compute(
         &self,
         key: Key,
@@ -186,7 +187,7 @@ impl Cache {
             {
                 answers.insert(key, Answer { reservation: None, ..answer.clone() });
             }
-            // From here on the answer is found in the cache.
+            // The answer is now in the cache.
             drop(remove);
             outcome
         };

@@ -1,10 +1,10 @@
-//! How much memory and how many cores this process may use.
+//! Memory and cores that this process may use.
 
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-/// Cores that this process may use: of the machine, of its affinity mask and of its control group the fewest.
+/// Cores that this process may use: the minimum of machine, affinity mask and control group.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
@@ -22,13 +22,13 @@ fn memory_bytes_below(root: &Path) -> Option<u64> {
     });
     let group = read(Path::new("proc/self/cgroup")).unwrap_or_default();
     let path = group.lines().find_map(|line| line.strip_prefix("0::")).unwrap_or("/");
-    // A limit of any group around this one counts too. A container sees its own group as the root.
+    // A limit of a parent group counts too. A container sees its own group as the root.
     let groups = Path::new(path.trim_start_matches('/')).ancestors();
     let limit = |group: &Path| {
         let file = Path::new("sys/fs/cgroup").join(group).join("memory.max");
         read(&file)?.trim().parse::<u64>().ok()
     };
-    // In version 1 of control groups a container sees its own limit here.
+    // In cgroup version 1 a container sees its own limit here.
     let first = read(Path::new("sys/fs/cgroup/memory/memory.limit_in_bytes")).and_then(|text| text.trim().parse().ok());
     groups.filter_map(limit).chain(machine_bytes).chain(first).min()
 }

@@ -1,4 +1,4 @@
-//! Where computations run and what they may take: permits, the byte budget, the cache.
+//! Resources of computations: permits, threads, the byte budget, the cache.
 
 pub mod budget;
 pub mod cache;

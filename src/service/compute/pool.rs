@@ -1,11 +1,11 @@
-//! Runs computations, a bounded number at once.
+//! The pool runs computations on a fixed number of threads.
 //!
-//! **CPU.** Every computation holds one permit. There are N permits for single requests and as many for background work (batches,
-//! studies), whose threads run at `nice` 10: the kernel shares the cores between the two.
-//! **Queue.** Permits are given in the order of the requests. At most 32 requests wait; the next one gets 503 `queue_full`. At most 16
-//! batches run.
-//! **Time.** A computation looks at its stop flag. The flag is set when nobody waits for the result any more: the client has left, the
-//! deadline of the request is over, or the service stops.
+//! **CPU.** Every computation holds one permit. There are N permits for single requests and N for background work
+//! (batches, studies). Background threads run at `nice` 10, and the kernel shares the cores between the two kinds.
+//! **Queue.** Permits are granted in the order of the requests. At most 32 requests wait; the next one gets 503
+//! `queue_full`. At most 16 batches run.
+//! **Time.** A computation checks its stop flag. The flag is set when the client leaves, when the deadline of the
+//! request passes, or when the service stops. Computations below some 0.1 ms run to their end.
 
 use std::io;
 use std::panic::{self, AssertUnwindSafe};
@@ -22,16 +22,16 @@ use tracing::Span;
 
 use crate::http::problem::{Problem, ProblemCode};
 
-/// Requests that may wait for a permit.
+/// Most requests that wait for a permit.
 pub const MAX_WAITING_REQUESTS: usize = 32;
 
-/// Batches that may run at once.
+/// Most batches that run at once.
 pub const MAX_RUNNING_BATCHES: usize = 16;
 
-/// The `nice` value of background threads: beside a busy interactive thread they get a tenth of a core.
+/// The `nice` value of background threads. Next to a busy interactive thread they get a tenth of a core.
 const BACKGROUND_NICE: i32 = 10;
 
-/// Thirty years: longer than any deadline, and short enough for timers.
+/// Thirty years: longer than any deadline, and within the range of timers.
 const FAR_FUTURE: Duration = Duration::from_secs(30 * 365 * 24 * 3600);
 
 type Job = Box<dyn FnOnce() + Send>;
@@ -52,7 +52,7 @@ impl Workers {
             let waiting = Arc::clone(&waiting);
             thread::Builder::new().name(format!("{name}-{number}")).spawn(move || {
                 if nice > 0 {
-                    // Linux applies this to the thread. If it refuses, background work competes as equal.
+                    // Linux applies this to the thread. If it fails, background threads have normal priority.
                     let _ = rustix::process::nice(nice);
                 }
                 loop {
@@ -79,11 +79,11 @@ struct Inner {
     stopping: CancellationToken,
 }
 
-/// The service's threads and permits; clones share them.
+/// The threads and permits of the service. Clones share them.
 #[derive(Debug, Clone)]
 pub struct Pool(Arc<Inner>);
 
-/// Sets the stop flag when the result is not awaited any more.
+/// Sets the stop flag if it is dropped before the result arrives.
 struct StopOnDrop {
     flag: Arc<AtomicBool>,
     is_done: bool,
@@ -99,7 +99,7 @@ impl Drop for StopOnDrop {
 }
 
 impl Pool {
-    /// A pool with this many permits, and threads, of each kind.
+    /// Starts a pool with this many permits and threads of each kind.
     pub fn start(permits: usize) -> io::Result<Self> {
         Ok(Self(Arc::new(Inner {
             interactive: Workers::start("solve", permits, 0)?,
@@ -115,33 +115,33 @@ impl Pool {
         self.0.interactive.count
     }
 
-    /// Computations that run now, of requests and in the background.
+    /// Running computations, of requests and in the background.
     pub fn running(&self) -> usize {
         self.0.interactive.running() + self.0.background.running()
     }
 
-    /// Requests that wait for a permit now.
+    /// Requests that wait for a permit.
     pub fn waiting(&self) -> usize {
         MAX_WAITING_REQUESTS - self.0.waiting.available_permits()
     }
 
-    /// Batches that run now.
+    /// Running batches.
     pub fn batches(&self) -> usize {
         MAX_RUNNING_BATCHES - self.0.batches.available_permits()
     }
 
-    /// Sets every stop flag, and refuses further computations with `shutting_down`.
+    /// Sets every stop flag and refuses further computations with `shutting_down`.
     pub fn stop(&self) {
         self.0.stopping.cancel();
     }
 
-    /// Completes when [`Self::stop`] was called.
+    /// Completes after the call of [`Self::stop`].
     pub async fn stopped(&self) {
         self.0.stopping.cancelled().await;
     }
 
-    /// Computes for a request. Dropping the future sets the stop flag.
-    /// Fails with `queue_full`, `shutting_down`, and `internal_error` for a panic.
+    /// Computes for a request. Dropping the future sets the stop flag. Fails with `queue_full`, with `shutting_down`,
+    /// or with `internal_error` after a panic.
     pub async fn run<T: Send + 'static>(
         &self,
         job: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
@@ -150,13 +150,14 @@ impl Pool {
         self.run_on(&self.0.interactive, permit, job).await
     }
 
-    /// Computes for a request on the executor's own thread: for work of at most some 0.1 ms, of which a change of threads would be a quarter.
+    /// Computes for a request on the executor's thread. For work of at most about 0.1 ms: a change of threads would add
+    /// a quarter.
     pub async fn run_inline<T>(&self, job: impl FnOnce(&AtomicBool) -> Result<T, Problem>) -> Result<T, Problem> {
         let _permit = self.interactive_permit().await?;
         timed(|| catch_panic(|| job(&AtomicBool::new(false))))
     }
 
-    /// Computes in the background, for at most `time` once it has a permit. Dropping the future sets the stop flag.
+    /// Computes in the background, for at most `time` after it got a permit. Dropping the future sets the stop flag.
     pub async fn run_in_background<T: Send + 'static>(
         &self,
         time: Duration,
@@ -166,13 +167,10 @@ impl Pool {
         within(Deadline::after(time), self.run_on(&self.0.background, permit, job)).await
     }
 
-    /// A place for a batch, to be held while it runs.
-    /// Fails with `queue_full` if 16 batches run.
+    /// Returns a permit that a batch holds while it runs. Fails with `queue_full` if 16 batches run.
     pub fn begin_batch(&self) -> Result<OwnedSemaphorePermit, Problem> {
         Arc::clone(&self.0.batches).try_acquire_owned().map_err(|_| {
-            let detail = format!(
-                "{MAX_RUNNING_BATCHES} batches run, the most that this service runs at once. Try again in a second"
-            );
+            let detail = format!("{MAX_RUNNING_BATCHES} batches run, which is the limit. Retry after 1 s");
             Problem::new(ProblemCode::QueueFull, detail)
         })
     }
@@ -184,7 +182,7 @@ impl Pool {
         }
         let _waiting = self.0.waiting.try_acquire().map_err(|_| {
             let detail = format!(
-                "{} computations run and {MAX_WAITING_REQUESTS} requests wait. Try again in a second",
+                "{} computations run and {MAX_WAITING_REQUESTS} requests wait, which is the limit. Retry after 1 s",
                 self.permits()
             );
             Problem::new(ProblemCode::QueueFull, detail)
@@ -212,9 +210,9 @@ impl Pool {
         let span = Span::current();
         let job = Box::new(move || {
             let result = span.in_scope(|| timed(|| catch_panic(|| job(&flag))));
-            // Before the result is sent, so that its receiver finds the permit free.
+            // The permit is free before the receiver gets the result.
             drop(permit);
-            // An error means that nobody waits for the result.
+            // An error means that the receiver was dropped.
             let _ = sender.send(result);
         });
         workers.jobs.send(job).map_err(|error| Problem::internal(&error))?;
@@ -236,37 +234,39 @@ fn timed<T>(job: impl FnOnce() -> T) -> T {
     result
 }
 
-/// The result of a job; a panic is an internal error.
+/// Returns the result of a job. A panic becomes an internal error.
 pub fn catch_panic<T>(job: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem> {
     panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| Err(Problem::panicked(panic.as_ref())))
 }
 
-/// The result of a future that has until the deadline, at which it is dropped.
+/// Returns the result of a future, which is dropped at the deadline.
 pub async fn within<T>(deadline: Deadline, future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
     tokio::time::timeout_at(deadline.at, future).await.unwrap_or_else(|_| {
-        let detail =
-            format!("the request took longer than {} ms. Ask for less, or try again", deadline.span.as_millis());
+        let detail = format!(
+            "the computation took longer than {} ms, the limit that follows from `deadline_ms`. Request less, or retry",
+            deadline.span.as_millis()
+        );
         Err(Problem::new(ProblemCode::DeadlineExceeded, detail))
     })
 }
 
-/// The time at which the work for a request is stopped.
+/// Time at which the work for a request is stopped.
 #[derive(Debug, Clone, Copy)]
 pub struct Deadline {
-    /// When.
+    /// The time.
     pub at: tokio::time::Instant,
     span: Duration,
 }
 
 impl Deadline {
-    /// After this time from now.
+    /// Returns the deadline after this time from now.
     pub fn after(span: Duration) -> Self {
         let now = tokio::time::Instant::now();
-        // A span beyond all time means no deadline.
+        // If the sum overflows, the deadline is thirty years away.
         Self { at: now.checked_add(span).unwrap_or(now + FAR_FUTURE), span }
     }
 }
 
 fn shutting_down() -> Problem {
-    Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Try again: another one may have taken its place")
+    Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Retry: another instance may have replaced it")
 }

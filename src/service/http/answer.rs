@@ -1,4 +1,4 @@
-//! Answers a request that sends a design document: bytes, document, key, cache, checked parameters, answer, bytes.
+//! Answers a request with a design document: bytes, document, key, cache, checked parameters, answer, bytes.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -23,57 +23,57 @@ use utoipa::IntoResponses;
 use super::negotiation::{self, Representation};
 use super::problem::{Problem, ProblemCode};
 use crate::app::App;
-use crate::compute::budget::{Budget, FREE_BYTES, PART_OF_UNKNOWN_SIZE, Reservation};
+use crate::compute::budget::{Budget, FREE_BYTES, Reservation, UNKNOWN_SIZE_DIVISOR};
 use crate::compute::cache::{Answer, CacheStatus, MAX_BODY_BYTES, RequestHash};
 use crate::compute::pool::{Deadline, within};
 
-/// Documents up to this size are read on the executor: that takes some tenths of a millisecond.
+/// Largest document that is parsed on the executor. This takes some 0.1 ms.
 const SHORT_DOCUMENT_BYTES: usize = 8 << 10;
 
-/// The rest of a refused body that is still read, so that the client gets the refusal and not a reset connection.
+/// Bytes of a refused body that are still read. The client then gets the refusal instead of a connection reset.
 const MAX_DISCARDED_BYTES: usize = 1 << 20;
 
-/// How long computing took.
+/// Header with the time of the computation.
 pub const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 
-/// Where the answer came from (RFC 9211).
+/// Header with the source of the answer (RFC 9211).
 pub const CACHE_STATUS: HeaderName = HeaderName::from_static("cache-status");
 
-/// The statuses that every endpoint for design documents answers with, beside 200 and 304.
+/// Problem responses of every endpoint for design documents.
 #[derive(IntoResponses)]
 pub enum Problems {
-    /// The body is no JSON.
+    /// The body is not JSON.
     #[response(status = 400, content_type = "application/problem+json")]
     Malformed(#[to_schema] Problem),
-    /// No representation that the client accepts.
+    /// The client accepts no available representation.
     #[response(status = 406, content_type = "application/problem+json")]
     NotAcceptable(#[to_schema] Problem),
-    /// The body did not arrive in time.
+    /// The body did not arrive within the time limit.
     #[response(status = 408, content_type = "application/problem+json")]
     RequestTimeout(#[to_schema] Problem),
     /// The body exceeds `max_body_bytes`.
     #[response(status = 413, content_type = "application/problem+json")]
     BodyTooLarge(#[to_schema] Problem),
-    /// The body is not sent as plain JSON.
+    /// The body is not plain `application/json`.
     #[response(status = 415, content_type = "application/problem+json")]
     UnsupportedMediaType(#[to_schema] Problem),
-    /// JSON that is no design document, or describes no possible drive, load or request.
+    /// The JSON is not a design document, or the drive, load or request is impossible.
     #[response(status = 422, content_type = "application/problem+json")]
     Unprocessable(#[to_schema] Problem),
-    /// A fault of the service itself.
+    /// The service has an internal error.
     #[response(status = 500, content_type = "application/problem+json")]
     Internal(#[to_schema] Problem),
-    /// The service is full, or the deadline stopped the computation; `Retry-After` says when to try again.
+    /// The service is full, or the deadline stopped the computation. `Retry-After` has the seconds until a retry.
     #[response(status = 503, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))]
     Unavailable(#[to_schema] Problem),
 }
 
-/// Where an answer came from: an extension of the response, for log and metrics.
+/// Source of an answer. The response carries it as an extension for log and metrics.
 #[derive(Debug, Clone, Copy)]
 pub struct Provenance {
     /// Cache or computation.
     pub status: CacheStatus,
-    /// How long computing took.
+    /// Time of the computation.
     pub solve: Duration,
 }
 
@@ -122,14 +122,14 @@ async fn answer_request<Q: Question>(
     };
     response.extensions_mut().insert(Provenance { status, solve });
     let headers = response.headers_mut();
-    // Hexadecimal digits and quotes always are a header value.
+    // Hexadecimal digits and quotes are always a valid header value.
     headers.insert(header::ETAG, HeaderValue::from_str(&etag).unwrap_or(HeaderValue::from_static("")));
     headers.insert(header::VARY, HeaderValue::from_static("accept, accept-encoding"));
     headers.insert(CACHE_STATUS, HeaderValue::from_static(status.header()));
     Ok(response)
 }
 
-/// Answers a request without the cache, because its answer is measured at that moment.
+/// Answers a request without the cache, because the answer contains measured times.
 pub async fn respond_uncached<Q: Question>(question: Q, app: Arc<App>, request: Request) -> Response {
     let deadline = app.deadline();
     let answer = async {
@@ -162,8 +162,8 @@ impl DocumentRequest {
     }
 }
 
-/// The body of a request, at most `max_body_bytes` long.
-/// Fails with `body_too_large`, `broken_body`, `request_timeout` or `shutting_down`.
+/// Reads the body of a request, at most `max_body_bytes` long. Fails with `body_too_large`, `broken_body`,
+/// `request_timeout` or `shutting_down`.
 pub async fn read_body(app: &App, deadline: Deadline, headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
     let limit = app.limits.max_body_bytes;
     let announced = headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse::<usize>().ok());
@@ -183,29 +183,31 @@ pub async fn read_body(app: &App, deadline: Deadline, headers: &HeaderMap, body:
     };
     let in_time = tokio::select! {
         in_time = tokio::time::timeout_at(deadline.at, reading) => in_time,
-        () = app.pool.stopped() => return Err(Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Try again")),
+        () = app.pool.stopped() => return Err(Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Retry")),
     };
     match in_time {
         Ok(read) => read?,
         Err(_) => {
-            let detail = format!("the body did not arrive within {} ms. Send it faster", app.limits.deadline_ms);
+            let detail =
+                format!("the body did not arrive within `deadline_ms` ({} ms). Send it faster", app.limits.deadline_ms);
             return Err(Problem::new(ProblemCode::RequestTimeout, detail));
         }
     }
     if length > limit {
         let length = announced.map_or_else(|| format!("more than {limit}"), |announced| announced.to_string());
-        let detail = format!("the body has {length} bytes. Send at most the {limit} of `max_body_bytes`");
+        let detail = format!("the body has {length} bytes. Send at most {limit} bytes (`max_body_bytes`)");
         return Err(Problem::new(ProblemCode::BodyTooLarge, detail));
     }
     Ok(whole.freeze())
 }
 
-/// The problem of a body that breaks off.
+/// Returns the problem of an incomplete body.
 pub fn broken_body(error: &dyn std::fmt::Display) -> Problem {
-    Problem::new(ProblemCode::BrokenBody, format!("the body cannot be read to its end: {error}"))
+    Problem::new(ProblemCode::BrokenBody, format!("the body is incomplete or damaged: {error}. Send it again"))
 }
 
-/// The design of a body, and a value computed from it. A long document is read on a thread of the pool, not on the executor.
+/// Parses the design and computes a value from it. A long document is parsed on a thread of the pool, not on the
+/// executor.
 async fn read_design<T: Send + 'static>(
     app: &App,
     body: Bytes,
@@ -232,16 +234,16 @@ async fn compute<Q: Question>(
     if is_short { app.pool.run_inline(job).await } else { app.pool.run(job).await }
 }
 
-/// The upper bound of what an answer takes while it is computed and written.
+/// Upper bound of the bytes that an answer needs while it is computed and written.
 pub fn bound<Q: Question>(budget: &Budget, checked: &Q::Checked, format: Format) -> u64 {
     match Q::max_bytes(checked, format) {
         Some(bytes) => bytes,
-        None => budget.max_bytes() / PART_OF_UNKNOWN_SIZE,
+        None => budget.max_bytes() / UNKNOWN_SIZE_DIVISOR,
     }
 }
 
-/// Computes an answer and writes its body, which then holds the rest of the reservation.
-/// Fails with `too_many_states` if it outgrows its reservation.
+/// Computes an answer and writes its body, which holds the rest of the reservation. Fails with `too_many_states` if the
+/// answer exceeds its reservation.
 fn solve<Q: Question>(
     checked: &Q::Checked,
     representation: Representation,
@@ -261,27 +263,26 @@ fn solve<Q: Question>(
     Ok(Answer { reservation: shrink_to_body(reservation, body.len()), body, solve, server_timing })
 }
 
-/// Checks that an answer fits into what was reserved for it.
+/// Checks that an answer fits into its reservation.
 pub fn require_within(reservation: &Reservation, bytes: u64) -> Result<(), Problem> {
     if bytes <= reservation.bytes() {
         return Ok(());
     }
     let detail = format!(
-        "the answer takes {bytes} bytes, and {} are reserved for one whose size is not known before. Widen the tolerance",
+        "the answer needs {bytes} bytes, but a sweep with a tolerance may take at most {}. Use a larger tolerance",
         reservation.bytes()
     );
     Err(Problem::new(ProblemCode::TooManyStates, detail))
 }
 
-/// Gives back what a body does not need of its reservation: all of it if the body is small.
+/// Returns the bytes that a body does not need to the budget. A small body returns all.
 pub fn shrink_to_body(reservation: Option<Reservation>, bytes: usize) -> Option<Arc<Reservation>> {
     let mut reservation = reservation.filter(|_| bytes as u64 > FREE_BYTES)?;
     reservation.shrink_to(bytes as u64);
     Some(Arc::new(reservation))
 }
 
-/// Writes an answer as its representation says.
-/// Fails with `deadline_exceeded` if the stop flag is set.
+/// Writes an answer in its representation. Fails with `deadline_exceeded` if the stop flag is set.
 pub fn write<A: Forms>(
     answer: &A,
     Representation { format, gzip }: Representation,
@@ -299,12 +300,13 @@ pub fn write<A: Forms>(
     written.map(without_spare).map_err(|error| write_problem(&error, stop))
 }
 
-/// The bytes of a buffer without its spare capacity. A body that may be cached is copied: the pages of the buffer are used again at once.
+/// Returns the bytes without spare capacity. A body that may be cached is copied, because the buffer's pages are reused
+/// at once.
 fn without_spare(bytes: Vec<u8>) -> Bytes {
     if bytes.len() <= MAX_BODY_BYTES { Bytes::copy_from_slice(&bytes) } else { bytes.into_boxed_slice().into() }
 }
 
-/// Why an answer could not be written into memory.
+/// Returns the problem of an answer that could not be written.
 pub fn write_problem(error: &io::Error, stop: &AtomicBool) -> Problem {
     if stop.load(Ordering::Relaxed) { NoAnswer::stopped().into() } else { Problem::internal(error) }
 }
@@ -314,7 +316,7 @@ const STOP_CHECK_BYTES: usize = 1 << 16;
 
 /// A writer that fails once the stop flag is set.
 pub struct StoppableWriter<'a, W> {
-    /// Where the bytes go.
+    /// The target of the bytes.
     pub inner: W,
     bytes_until_check: usize,
     stop: &'a AtomicBool,
@@ -338,7 +340,7 @@ impl<W: Write> Write for StoppableWriter<'_, W> {
         self.write_all(bytes).map(|()| bytes.len())
     }
 
-    // Called for every number.
+    // Inlined, because every number calls it.
     #[inline]
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self.bytes_until_check.checked_sub(bytes.len()) {
@@ -356,7 +358,7 @@ impl<W: Write> Write for StoppableWriter<'_, W> {
 
 async fn with_body(budget: &Budget, answer: Answer, representation: Representation) -> Result<Response, Problem> {
     let Answer { body, reservation, server_timing, .. } = answer;
-    // A large answer from the cache may leave it while a slow client reads.
+    // A large answer may leave the cache while a slow client still reads it.
     let reservation = match reservation {
         None => shrink_to_body(budget.reserve(body.len() as u64).await?, body.len()),
         reservation => reservation,
@@ -366,11 +368,11 @@ async fn with_body(budget: &Budget, answer: Answer, representation: Representati
     Ok(response)
 }
 
-/// The response with this body.
+/// Returns the response with this body.
 pub fn body_response(body: Bytes, Representation { format, gzip }: Representation) -> Response {
     let mut response = (StatusCode::OK, body).into_response();
     let headers = response.headers_mut();
-    // These, and those of the layers around.
+    // Space for these headers and those of the middleware.
     headers.reserve(12);
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(format.media_type()));
     if gzip {
@@ -389,9 +391,9 @@ mod tests {
 
     use super::{STOP_CHECK_BYTES, StoppableWriter};
 
-    /// Of a megabyte of zeros a kilobyte comes out of the encoder: the check must not depend on it.
+    /// Compressed output may be tiny (1 KB for 1 MB of zeros), so the check counts input bytes.
     #[test]
-    fn stops_writing_compressible_answers_too() {
+    fn stops_while_compressing() {
         let stop = AtomicBool::new(true);
         let mut writer = StoppableWriter::new(GzEncoder::new(Vec::new(), Compression::fast()), &stop);
         let written = (0..STOP_CHECK_BYTES).take_while(|_| writer.write_all(&[0; 1024]).is_ok()).count();

@@ -1,11 +1,11 @@
-//! Ready design documents, compiled in from `examples/`.
+//! Example design documents, compiled in from `examples/`.
 
-/// A design document by name.
+/// An example design document.
 #[derive(Debug, Clone, Copy)]
 pub struct Example {
-    /// Its name in the path.
+    /// Name in the path.
     pub name: &'static str,
-    /// What it shows.
+    /// Short description.
     pub title: &'static str,
     /// The document.
     pub document: &'static str,
@@ -21,20 +21,20 @@ macro_rules! examples {
     };
 }
 
-/// All of them.
+/// All examples.
 pub const EXAMPLES: &[Example] = examples! {
     "paper-5.1": "The paper's case 5.1: no undercut, seven teeth in each zone",
     "paper-5.2": "The paper's case 5.2: undercut, every second slot filled",
-    "paper-5.2-bored": "Case 5.2 bored at 52.8227 mm: three or four teeth in each zone, as in the paper's figures 20 to 25",
+    "paper-5.2-bored": "The paper's case 5.2 with a ring bore of 52.8227 mm: three or four teeth in each zone, as in its figures 20 to 25",
     "ring-with-more-teeth": "A ring with two teeth more than the carrier, fixed stiffnesses, virtual work",
-    "eccentric-roller": "An eccentric circle pushes rollers, the ring has one tooth more: the usual form of open wave reducers",
+    "eccentric-roller": "Rollers on an eccentric circle, a ring with one tooth more: the usual form of open wave reducers",
     "harmonic-three-lobes": "A harmonic cam of three lobes: three zones share the load",
     "harmonic-path": "Teeth that move along a cosine",
     "balls": "Balls in grooves around an eccentric circle, by Hertz's law of point contacts",
     "flat-sided": "Case 5.1 with flat-sided teeth, which lie on the walls of their slots",
 };
 
-/// The example of that name.
+/// Returns the example with this name.
 pub fn by_name(name: &str) -> Option<&'static Example> {
     EXAMPLES.iter().find(|example| example.name == name)
 }

@@ -1,4 +1,4 @@
-//! HTTP: connections, paths, the walk of a request, problems.
+//! HTTP: connections, routes, request processing, problems.
 
 pub mod answer;
 pub mod endpoints;

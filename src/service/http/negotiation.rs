@@ -1,4 +1,4 @@
-//! What the client sends and accepts: media types, codings, and queries where a path has none.
+//! Content negotiation: media types, content codings, and the check for queries.
 
 use std::borrow::Cow;
 use std::iter;
@@ -14,15 +14,15 @@ use toothwave_calculation::key::{Encode, Encoder};
 
 use super::problem::{Problem, ProblemCode};
 
-/// Of a list of what is accepted, in bytes: each of its items is read, sorted and compared before anything else is known of a request, and browsers' have some hundred bytes.
+/// Longest `Accept` or `Accept-Encoding` list that is read, in bytes. Browsers send some hundred bytes.
 const MOST_OF_A_LIST: usize = 4096;
 
-/// A format with its coding. Each representation has its own entity tag.
+/// A format with its content coding. Each representation has its own entity tag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Representation {
     /// The format.
     pub format: Format,
-    /// Whether it is compressed.
+    /// True if it is compressed.
     pub gzip: bool,
 }
 
@@ -37,14 +37,13 @@ impl Representation {
     /// JSON, uncompressed.
     pub const JSON: Self = Self { format: Format::Json, gzip: false };
 
-    /// The best of JSON and, after it, `others`, in the service's order, for what the request accepts.
+    /// Selects the best representation that the request accepts: JSON first, then `others`, in the service's order.
     /// Fails with `not_acceptable` if the client accepts none of them.
     pub fn negotiate(headers: &HeaderMap, others: impl Iterator<Item = Format>) -> Result<Self, Problem> {
         let gzip = accepts_gzip(headers);
         let accepted = joined(headers, &header::ACCEPT);
         if accepted.len() > MOST_OF_A_LIST {
-            let detail =
-                format!("`Accept` has {} bytes, more than the {MOST_OF_A_LIST} that are read of it", accepted.len());
+            let detail = format!("the header `Accept` has {} bytes. Send at most {MOST_OF_A_LIST}", accepted.len());
             return Err(Problem::new(ProblemCode::NotAcceptable, detail));
         }
         if accepted.trim().is_empty() {
@@ -59,7 +58,7 @@ impl Representation {
             let offered: Vec<_> = offered.iter().map(|(_, media_type)| media_type.to_string()).collect();
             Problem::new(
                 ProblemCode::NotAcceptable,
-                format!("this path answers with {}, and the request accepts none of it", offered.join(" or ")),
+                format!("the header `Accept` allows no available media type. Accept {}", offered.join(" or ")),
             )
         })?;
         Ok(Self { format, gzip })
@@ -91,20 +90,20 @@ pub fn require_no_query(uri: &Uri) -> Result<(), Problem> {
     match uri.query() {
         None | Some("") => Ok(()),
         Some(query) => {
-            let detail = format!("`{}` takes no query, and the request has `{query}`. Leave it out", uri.path());
+            let detail = format!("`{}` takes no query, but the request has `{query}`. Leave it out", uri.path());
             Err(Problem::new(ProblemCode::InvalidQuery, detail))
         }
     }
 }
 
-/// Checks that the body is sent as JSON without a content coding.
+/// Checks that the body is JSON without a content coding.
 pub fn require_json(headers: &HeaderMap) -> Result<(), Problem> {
     require_type(headers, "a design document as `application/json`", |media_type| {
         media_type.subty == names::JSON || media_type.suffix == Some(names::JSON)
     })
 }
 
-/// Checks that the body is sent as one JSON document a line.
+/// Checks that the body is NDJSON without a content coding.
 pub fn require_ndjson(headers: &HeaderMap) -> Result<(), Problem> {
     let known = ["x-ndjson", "ndjson", "jsonl", "x-jsonlines"];
     require_type(headers, "a design document a line as `application/x-ndjson`", |media_type| {
@@ -112,19 +111,17 @@ pub fn require_ndjson(headers: &HeaderMap) -> Result<(), Problem> {
     })
 }
 
-/// Checks that the body has no coding and is an application's type that fits.
+/// Checks that the body has no coding and an `application/` media type that fits.
 fn require_type(headers: &HeaderMap, wanted: &str, fits: impl Fn(&MediaType<'_>) -> bool) -> Result<(), Problem> {
     let unsupported =
-        |found: String| Err(Problem::new(ProblemCode::UnsupportedMediaType, format!("{found}; send {wanted}")));
+        |found: String| Err(Problem::new(ProblemCode::UnsupportedMediaType, format!("{found}. Send {wanted}")));
     let coding = joined(headers, &header::CONTENT_ENCODING);
     if !coding.is_empty() && !coding.eq_ignore_ascii_case("identity") {
-        return unsupported(format!("the body is coded as `{coding}`, and no coding is read"));
+        return unsupported(format!("the body has the content coding `{coding}`, and no coding is supported"));
     }
     let coding = joined(headers, &header::TRANSFER_ENCODING);
     if !coding.is_empty() && !coding.eq_ignore_ascii_case("chunked") {
-        return unsupported(format!(
-            "the body is sent in the transfer codings `{coding}`, and `chunked` alone is read"
-        ));
+        return unsupported(format!("the body has the transfer coding `{coding}`, and only `chunked` is supported"));
     }
     let content_type = joined(headers, &header::CONTENT_TYPE);
     if MediaType::parse(&content_type).is_ok_and(|media_type| media_type.ty == names::APPLICATION && fits(&media_type))
@@ -133,12 +130,12 @@ fn require_type(headers: &HeaderMap, wanted: &str, fits: impl Fn(&MediaType<'_>)
     } else if content_type.is_empty() {
         unsupported("the request has no `Content-Type`".into())
     } else {
-        unsupported(format!("the body is sent as `{content_type}`"))
+        unsupported(format!("the body has the media type `{content_type}`"))
     }
 }
 
-/// Media ranges with nothing but their weights, and only those that can be read: who asks for `application/json; charset=utf-8` takes JSON as it is, and older
-/// clients list `*` beside `*/*`. No type that is offered has a parameter with a quoted `,` or `;`.
+/// Returns the valid media ranges with their weights alone. `application/json; charset=utf-8` accepts plain JSON, and
+/// older clients list `*` next to `*/*`. No offered type has a parameter with a quoted `,` or `;`.
 fn without_parameters(accepted: &str) -> String {
     let ranges = accepted.split(',').map(|range| {
         let (media_type, parameters) = range.split_once(';').unwrap_or((range, ""));
@@ -149,7 +146,7 @@ fn without_parameters(accepted: &str) -> String {
     ranges.filter(|range| MediaType::parse(range.trim()).is_ok()).collect::<Vec<_>>().join(",")
 }
 
-/// Whether the request prefers gzip to no coding at all.
+/// True if the request prefers gzip to no coding.
 pub fn accepts_gzip(headers: &HeaderMap) -> bool {
     let accepted = joined(headers, &header::ACCEPT_ENCODING);
     if accepted.len() > MOST_OF_A_LIST {
@@ -170,15 +167,15 @@ pub fn accepts_gzip(headers: &HeaderMap) -> bool {
     gzip > 0.0 && gzip >= quality("identity").unwrap_or(0.0)
 }
 
-/// All lines of a header as one list; a value that is no text counts as absent.
+/// Joins all lines of a header to one list. A value that is not text counts as absent.
 fn joined<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Cow<'a, str> {
     let mut values = headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
     let first = values.next().unwrap_or_default();
     values.fold(first.into(), |list, value| format!("{list},{value}").into())
 }
 
-/// Whether `If-None-Match` names this entity tag, compared weakly as the header wants it. `*`, which stands for any, is ignored: it is for
-/// what a client would overwrite, and one that has no answer would get none.
+/// True if `If-None-Match` contains this entity tag (weak comparison, RFC 9110). `*` is ignored: it serves writes, and
+/// a client without an answer would get none.
 pub fn is_not_modified(headers: &HeaderMap, etag: &str) -> bool {
     let listed = joined(headers, &header::IF_NONE_MATCH);
     listed.split(',').map(str::trim).any(|tag| tag.strip_prefix("W/").unwrap_or(tag) == etag)

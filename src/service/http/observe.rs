@@ -1,4 +1,4 @@
-//! What every request gets: an id, one line in the log, metrics, and the headers of every answer.
+//! The middleware around all routes: request id, log line, metrics, common headers.
 
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -17,16 +17,16 @@ use super::problem::{Problem, ProblemCode};
 use crate::app::App;
 use crate::ops::metrics::{self, Labels};
 
-/// The id of a request, the client's own or ours.
+/// Header with the id of a request: the client's own, or a new one.
 pub(crate) const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-/// The caller's ids (W3C Trace Context).
+/// Header with the caller's trace ids (W3C Trace Context).
 const TRACEPARENT: HeaderName = HeaderName::from_static("traceparent");
 
-/// Longest id that is taken over from a client.
+/// Longest id that is accepted from a client, in bytes.
 const MAX_ID_BYTES: usize = 128;
 
-/// An id that no other request has.
+/// Returns a unique id.
 fn new_id() -> HeaderValue {
     static PROCESS: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(std::process::id()));
     static REQUESTS: AtomicU64 = AtomicU64::new(0);
@@ -34,14 +34,14 @@ fn new_id() -> HeaderValue {
     HeaderValue::try_from(id).unwrap_or(HeaderValue::from_static("none"))
 }
 
-/// A header that is one short word.
+/// Returns a header if it is one short word.
 fn given(headers: &HeaderMap, name: HeaderName) -> Option<&HeaderValue> {
     let value = headers.get(name)?;
     let is_word = (1..=MAX_ID_BYTES).contains(&value.len()) && value.as_bytes().iter().all(u8::is_ascii_graphic);
     is_word.then_some(value)
 }
 
-/// A request on its way. Its line is logged when it is dropped: with the answer, or because the client has left.
+/// A running request. Dropping it writes its log line: after the response, or because the client has left.
 struct Line {
     span: Span,
     method: &'static str,
@@ -74,9 +74,9 @@ impl Drop for Line {
     }
 }
 
-/// The middleware around all paths.
+/// The middleware around all routes.
 pub(crate) async fn observe(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
-    // The route and not the path: labels must stay few. So must methods, which clients can invent.
+    // Labels must stay few: the route instead of the path, and known methods alone.
     let route = request.extensions().get::<MatchedPath>().cloned();
     let method = match *request.method() {
         Method::GET => "GET",
@@ -108,7 +108,7 @@ pub(crate) async fn observe(State(app): State<Arc<App>>, request: Request, next:
     drop(line);
     let headers = response.headers_mut();
     add_common_headers(headers, id);
-    // Clients that keep their connection learn that the service stops.
+    // Clients with kept-alive connections learn that the service is stopping.
     if !app.ready.load(Ordering::Relaxed) {
         headers.insert(header::CONNECTION, HeaderValue::from_static("close"));
     }
@@ -129,7 +129,7 @@ fn add_common_headers(headers: &mut HeaderMap, id: HeaderValue) {
     headers.insert(X_REQUEST_ID, id);
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.entry(header::REFERRER_POLICY).or_insert(HeaderValue::from_static("no-referrer"));
-    // The page and the documentation have policies of their own; nothing else is a document.
+    // The page and the documentation have their own policies.
     headers
         .entry(header::CONTENT_SECURITY_POLICY)
         .or_insert(HeaderValue::from_static("default-src 'none'; frame-ancestors 'none'"));

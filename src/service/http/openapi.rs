@@ -1,4 +1,4 @@
-//! The API document as generators of clients read it, and a rendering in OpenAPI 3.0.3 for those that do not know 3.1.
+//! The API document for client generators, and a version in OpenAPI 3.0.3 for generators without 3.1.
 
 use serde_json::{Map, Value, json};
 
@@ -6,7 +6,7 @@ use super::problem::PROBLEM_JSON;
 
 const SCHEMAS: &str = "/components/schemas";
 
-/// What utoipa has no words for: where the service stands, one `Problem` for all, and variants with names and a discriminator.
+/// Adds what utoipa cannot express: the server, one `Problem` for all, and named variants with a discriminator.
 pub(crate) fn for_generators(document: &mut Value) {
     document["servers"] = json!([{ "url": ".", "description": "The service that serves this document." }]);
     for_each_object(document, &mut |object| {
@@ -21,8 +21,8 @@ pub(crate) fn for_generators(document: &mut Value) {
     name_variants(document);
 }
 
-/// A variant that is an object of its own and, beside it, the word that names it, becomes one object: where the one admits no other field, both
-/// together would admit nothing.
+/// Joins a variant's schema and the schema of its tag to one object. With `additionalProperties: false`, `allOf` of the
+/// two would accept nothing.
 fn join_variants(document: &mut Value) {
     let Some(schemas) = document.pointer_mut(SCHEMAS).and_then(Value::as_object_mut) else { return };
     let fields = schemas.clone();
@@ -47,7 +47,7 @@ fn join_variants(document: &mut Value) {
     schemas.retain(|name, _| !joined.contains(name) || text.contains(&format!("\"#{SCHEMAS}/{name}\"")));
 }
 
-/// A parameter may be left out, but no header or query has a null.
+/// Removes `null` from the types of parameters. A header or query is absent, never null.
 fn parameter_that_is_never_null(object: &mut Map<String, Value>) {
     if object.contains_key("in")
         && let Some(kind) = object.get_mut("schema").and_then(|schema| schema.get_mut("type"))
@@ -60,14 +60,15 @@ fn parameter_that_is_never_null(object: &mut Map<String, Value>) {
     }
 }
 
-/// Of a field that may be left out but not be null, null is no default, though utoipa writes it: generators refuse it, or send it.
+/// Removes the default `null`, which utoipa writes, from fields that may be absent but not null. Generators reject or
+/// send it.
 fn no_null_by_default(schema: &mut Map<String, Value>) {
     if schema.get("default") == Some(&Value::Null) && !may_be_null(schema) {
         schema.remove("default");
     }
 }
 
-/// A default that is one of several words stands with these words, not beside the reference to them, of which a generator for C++ makes no value.
+/// Moves a default word from the reference to the referenced enum. The C++ generator needs it there.
 fn default_words_beside_their_words(document: &mut Value) {
     let mut moved = Vec::new();
     for_each_object(document, &mut |object| {
@@ -89,7 +90,7 @@ fn may_be_null(schema: &Map<String, Value>) -> bool {
     schema.get("type").and_then(Value::as_array).is_some_and(|types| types.iter().any(|name| name == "null"))
 }
 
-/// Every choice between objects that a field of one word tells apart: each becomes a schema of its own, and the word a discriminator.
+/// Names the variants of every tagged union: each becomes a schema, and the tag becomes the discriminator.
 fn name_variants(document: &mut Value) {
     let Some(schemas) = document.pointer_mut(SCHEMAS).and_then(Value::as_object_mut) else { return };
     let mut named = Map::new();
@@ -107,14 +108,14 @@ fn name_variants(document: &mut Value) {
     schemas.append(&mut named);
 }
 
-/// The field that has one word in each variant.
+/// Returns the field that has one fixed word in each variant.
 fn tag_of(schema: &Value) -> Option<String> {
     let variants = schema.get("oneOf")?.as_array()?;
     let is_tag = |tag: &&String| variants.iter().all(|variant| word_of(variant, tag).is_some());
     variants.first()?.get("properties")?.as_object()?.keys().find(is_tag).cloned()
 }
 
-/// The one word that a field of a variant may have.
+/// Returns the only word that a field of a variant may have.
 fn word_of<'a>(variant: &'a Value, tag: &str) -> Option<&'a str> {
     match variant.get("properties")?.get(tag)?.get("enum")?.as_array()?.as_slice() {
         [word] => word.as_str(),
@@ -130,8 +131,7 @@ fn reference(name: &str) -> Value {
     json!({ "$ref": format!("#{SCHEMAS}/{name}") })
 }
 
-/// The same API in OpenAPI 3.0.3, in as far as its generators can read it: of several forms of an answer the JSON one, and no path
-/// whose question or answer has none.
+/// Returns the same API in OpenAPI 3.0.3, for its generators: only JSON responses, and no path without JSON.
 pub(crate) fn as_3_0(document: &Value) -> Value {
     let mut document = document.clone();
     document["openapi"] = json!("3.0.3");
@@ -158,9 +158,9 @@ pub(crate) fn as_3_0(document: &Value) -> Value {
     document
 }
 
-/// A schema's words of 3.1 in those of 3.0. Whatever else is an object has none of them.
+/// Rewrites a schema's keywords from 3.1 to 3.0. Other objects have none of these keywords.
 fn schema_as_3_0(object: &mut Map<String, Value>) {
-    // A field that is itself called `type` holds a schema, which is an object, and stays.
+    // A property that is named `type` has a schema, which is an object, and stays.
     if let Some(Value::Array(types)) = object.get("type").cloned() {
         let (null, others): (Vec<_>, Vec<_>) = types.into_iter().partition(|kind| kind == "null");
         if let [kind] = &others[..] {
@@ -198,7 +198,7 @@ fn schema_as_3_0(object: &mut Map<String, Value>) {
             }
         }
     }
-    // Beside a reference 3.0 reads nothing.
+    // OpenAPI 3.0 ignores everything next to a reference.
     if object.len() > 1
         && let Some(target) = object.get("$ref").filter(|target| target.is_string()).cloned()
     {

@@ -1,6 +1,6 @@
-//! What bad input and trouble get: RFC 9457 problems, and the one map to them from the reasons why the calculation has no answer.
+//! Problems (RFC 9457), and the one map from the calculation's errors to them.
 //!
-//! Making a problem neither counts nor logs it: it goes along with the response that tells it, and `http/observe.rs` does both there.
+//! Making a problem does not count or log it. `http/observe.rs` does both when the response leaves.
 
 use std::any::Any;
 
@@ -15,14 +15,14 @@ use utoipa::ToSchema;
 /// The media type of problems.
 pub const PROBLEM_JSON: &str = "application/problem+json";
 
-/// Seconds after which a refused request may be worth trying again.
+/// Seconds until a retry of a refused request.
 pub const RETRY_AFTER_S: u32 = 1;
 
-/// A problem as it goes over the wire (RFC 9457).
+/// A problem as it is sent (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(example = json!({
     "type": "urn:toothwave:problem:impossible_design",
-    "title": "Values that no design can have",
+    "title": "The design is impossible",
     "status": 422,
     "detail": "/drive/wave_generator/semi_major_mm: the semi-major axis (56.0 mm) must exceed the semi-minor axis (56.0 mm): a round cam moves no tooth",
     "code": "impossible_design",
@@ -38,20 +38,20 @@ pub struct Problem {
     /// `urn:toothwave:problem:` and the code.
     #[serde(rename = "type")]
     pub kind: String,
-    /// The kind of problem in words.
+    /// Short text for the kind of problem.
     pub title: &'static str,
     /// HTTP status.
     #[schema(minimum = 400, maximum = 599)]
     pub status: u16,
-    /// What happened, and what to do about it.
+    /// Message: what is wrong, where, and what to do.
     pub detail: String,
-    /// The kind of problem, a stable word.
+    /// Kind of problem, as a stable word.
     pub code: ProblemCode,
-    /// Where fields are at fault: each of them, of more than 100 the first.
+    /// The wrong fields, at most the first 100.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(required = false, max_items = 100)]
     pub errors: Vec<FieldError>,
-    /// Of an internal error, why: for the log alone.
+    /// Cause of an internal error, for the log alone.
     #[serde(skip)]
     pub cause: Option<String>,
 }
@@ -60,102 +60,102 @@ pub struct Problem {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ProblemCode {
-    /// 400: the body is no JSON.
+    /// 400: the body is not JSON.
     MalformedJson,
-    /// 400: the body broke off, or is not coded as its head says.
+    /// 400: the body is incomplete, or its coding differs from its headers.
     BrokenBody,
-    /// 400: a query that the path does not know.
+    /// 400: the query is unknown or invalid.
     InvalidQuery,
-    /// 401: no key, or one that opens nothing.
+    /// 401: the key is missing or unknown.
     Unauthorized,
-    /// 404: nothing stands at this path.
+    /// 404: the path or the resource does not exist.
     NotFound,
-    /// 405: the path knows other methods.
+    /// 405: the path does not support this method.
     MethodNotAllowed,
-    /// 406: no representation that the client accepts.
+    /// 406: the client accepts no available representation.
     NotAcceptable,
-    /// 408: the body did not arrive in time.
+    /// 408: the body did not arrive within the time limit.
     RequestTimeout,
     /// 413: the body exceeds `max_body_bytes`.
     BodyTooLarge,
-    /// 415: the body is not sent as plain JSON.
+    /// 415: the body is not plain JSON.
     UnsupportedMediaType,
-    /// 421: a service that listens on this machine alone was asked under another name.
+    /// 421: the service listens on the loopback address, and the request has another host name.
     MisdirectedRequest,
-    /// 422: JSON of another form than the design document's.
+    /// 422: the JSON does not have the form of the document.
     InvalidDocument,
-    /// 422: values that no drive, load or request can have.
+    /// 422: a value is impossible for a drive, a load or a request.
     ImpossibleDesign,
-    /// 422: at some input angle no tooth has a lever arm.
+    /// 422: at some input angle no tooth carries load.
     NoToothInMesh,
-    /// 422: a `projection` whose stiffnesses give a tooth a compliance that is not positive.
+    /// 422: with these stiffnesses the `projection` form gives a tooth a compliance that is not positive.
     ComplianceNotPositive,
-    /// 422: a part is too full for a tooth that is to carry.
+    /// 422: teeth interfere with a part.
     Interference,
-    /// 422: the sweep has more states than `max_states`.
+    /// 422: the sweep has more states than `max_states`, or the answer exceeds the byte limit.
     TooManyStates,
     /// 422: the profiles have more points than `max_profile_points`.
     TooManyPoints,
-    /// 422: the study has more variants, or takes more bytes, than the service admits.
+    /// 422: the study has more variants or bytes than the limits.
     TooManyVariants,
-    /// 503: as many solves run and wait as the service admits.
+    /// 503: the limit of running and waiting computations is reached.
     QueueFull,
     /// 503: the deadline stopped the computation.
     DeadlineExceeded,
-    /// 503: the service is stopping, and the computation with it.
+    /// 503: the service is stopping.
     ShuttingDown,
-    /// 503: as many connections are open as the service admits.
+    /// 503: the limit of open connections is reached.
     TooManyConnections,
-    /// 503: so many bytes of answers are on their way to clients that there is no room for another.
+    /// 503: answers that clients have not read yet hold the byte budget.
     TooManyUnreadBytes,
     /// 501: the service was started without studies.
     StudiesOff,
-    /// 503: the file of studies cannot be read or written, for instance because the disk is full.
+    /// 503: the database file of the studies cannot be read or written, for example because the disk is full.
     StoreUnavailable,
-    /// 500: a fault of the service itself.
+    /// 500: the service has an internal error.
     InternalError,
 }
 
 impl ProblemCode {
-    /// Its HTTP status and its title.
+    /// Returns the HTTP status and the title.
     const fn status_and_title(self) -> (u16, &'static str) {
         match self {
-            Self::MalformedJson => (400, "The body is no JSON"),
-            Self::BrokenBody => (400, "The body broke off"),
-            Self::InvalidQuery => (400, "The path takes no such query"),
-            Self::Unauthorized => (401, "A key is needed"),
-            Self::NotFound => (404, "Nothing is at this path"),
-            Self::MethodNotAllowed => (405, "The path takes other methods"),
-            Self::NotAcceptable => (406, "No representation that the client accepts"),
+            Self::MalformedJson => (400, "The body is not JSON"),
+            Self::BrokenBody => (400, "The body is incomplete"),
+            Self::InvalidQuery => (400, "Invalid query"),
+            Self::Unauthorized => (401, "A valid key is required"),
+            Self::NotFound => (404, "Not found"),
+            Self::MethodNotAllowed => (405, "The path does not support this method"),
+            Self::NotAcceptable => (406, "No acceptable representation"),
             Self::RequestTimeout => (408, "The body did not arrive in time"),
             Self::BodyTooLarge => (413, "The body is too large"),
-            Self::UnsupportedMediaType => (415, "The body is not sent as plain JSON"),
+            Self::UnsupportedMediaType => (415, "Unsupported media type"),
             Self::MisdirectedRequest => (421, "Unknown host name"),
-            Self::InvalidDocument => (422, "The document has another form than is read here"),
-            Self::ImpossibleDesign => (422, "Values that no design can have"),
+            Self::InvalidDocument => (422, "The document has the wrong form"),
+            Self::ImpossibleDesign => (422, "The design is impossible"),
             Self::NoToothInMesh => (422, "At some input angle no tooth carries load"),
             Self::ComplianceNotPositive => (422, "The projection form has no solution"),
-            Self::Interference => (422, "A part is too full"),
+            Self::Interference => (422, "Teeth interfere with a part"),
             Self::TooManyStates => (422, "The sweep has too many states"),
             Self::TooManyPoints => (422, "The profiles have too many points"),
             Self::TooManyVariants => (422, "The study is too large"),
-            Self::InternalError => (500, "The service failed"),
-            Self::StudiesOff => (501, "This service takes no studies"),
+            Self::InternalError => (500, "Internal error"),
+            Self::StudiesOff => (501, "This service has no studies"),
             Self::QueueFull => (503, "The service is full"),
             Self::DeadlineExceeded => (503, "The deadline stopped the computation"),
             Self::ShuttingDown => (503, "The service is stopping"),
             Self::TooManyConnections => (503, "Too many connections are open"),
-            Self::TooManyUnreadBytes => (503, "Clients have too many bytes of answers to read"),
-            Self::StoreUnavailable => (503, "The file of studies cannot be used now"),
+            Self::TooManyUnreadBytes => (503, "Too many unread bytes"),
+            Self::StoreUnavailable => (503, "The study database is not available"),
         }
     }
 
-    /// Its HTTP status.
+    /// Returns the HTTP status.
     pub fn status(self) -> StatusCode {
         StatusCode::from_u16(self.status_and_title().0).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
     }
 
-    /// Requests that the service could answer but refuses now, or to this client.
+    /// Refusals: the request is valid, but the service does not answer it now, or not to this client.
     pub const REFUSALS: [Self; 9] = [
         Self::Unauthorized,
         Self::QueueFull,
@@ -197,15 +197,15 @@ impl From<NoAnswer> for Problem {
 }
 
 impl Problem {
-    /// A problem without fields.
+    /// Makes a problem without fields.
     pub fn new(code: ProblemCode, detail: impl Into<String>) -> Self {
         Self::at_fields(code, detail, Vec::new())
     }
 
-    /// A problem of these fields.
+    /// Makes a problem of these fields.
     fn at_fields(code: ProblemCode, detail: impl Into<String>, errors: Vec<FieldError>) -> Self {
         let mut detail = detail.into();
-        // Of a request's line too there may be very much to repeat.
+        // The detail may quote a long request.
         clip(&mut detail);
         Self {
             kind: format!("urn:toothwave:problem:{}", json::word(&code)),
@@ -218,21 +218,21 @@ impl Problem {
         }
     }
 
-    /// A panic, with its text for the log.
+    /// Makes the problem of a panic. The log gets its text.
     pub fn panicked(panic: &(dyn Any + Send)) -> Self {
         let text = panic.downcast_ref::<String>().map(String::as_str);
-        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a text");
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no text");
         Self::internal(&format_args!("a panic: {text}"))
     }
 
-    /// An internal fault: the client learns only that there was one.
+    /// Makes an internal error. The client does not see the cause.
     pub fn internal(cause: &dyn std::fmt::Display) -> Self {
-        let detail = "the service failed at this request; its log says why";
+        let detail = "the service failed. Its log has the cause";
         Self { cause: Some(cause.to_string()), ..Self::new(ProblemCode::InternalError, detail) }
     }
 }
 
-/// For people: every error where there are several.
+/// Text for people. Several errors are listed one a line.
 impl std::fmt::Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { title, detail, errors, .. } = self;

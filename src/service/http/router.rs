@@ -1,4 +1,4 @@
-//! All paths on one screen, and the layers around them in order.
+//! The routes, and the middleware around them.
 
 use std::net::IpAddr;
 use std::sync::{Arc, LazyLock};
@@ -36,18 +36,18 @@ use crate::page::static_file::StaticFile;
 #[openapi(
     info(
         title = "toothwave",
-        description = "Forces and contact stresses of discrete-tooth harmonic drives. Names of numbers end in their unit; where a finding or a problem has a value and a limit, the unit stands beside them.",
+        description = "Forces and contact stresses of discrete-tooth harmonic drives. The name of a number ends in its unit. The value and the limit of a finding or a problem have a separate unit field.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     tags(
-        (name = "drive", description = "One design document for every endpoint."),
-        (name = "studies", description = "Many variants of one design: maps, searches, sensitivities, tolerances."),
-        (name = "service", description = "Beside the drive.")
+        (name = "drive", description = "Calculations. Every endpoint reads the same design document."),
+        (name = "studies", description = "Many variants of one design: map, search, sensitivity, tolerance study."),
+        (name = "service", description = "Limits, examples, materials, health and metrics.")
     )
 )]
 struct Document;
 
-/// Paths with their description, made once: it takes long, and is the same for every router of the process.
+/// Routes with their descriptions. They are made once, because that takes long.
 static API: LazyLock<(Router<Arc<App>>, openapi::OpenApi)> = LazyLock::new(|| api().split_for_parts());
 
 fn api() -> OpenApiRouter<Arc<App>> {
@@ -76,24 +76,24 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .merge(without_document.layer(middleware::from_fn(without_query)))
 }
 
-/// Who may use the service.
+/// Access rules of the service.
 #[derive(Debug, Clone, Default)]
 pub struct Access {
     /// Origins that browsers may call from.
     pub cors_origins: Vec<String>,
     /// The keys, if requests need one.
     pub keys: Option<Keys>,
-    /// Whether requests must name this machine as their host.
+    /// True if requests must use a loopback host name.
     pub checks_host: bool,
 }
 
-/// The API document as it is committed and served.
+/// Returns the API document.
 pub fn openapi_json() -> &'static str {
     static JSON: LazyLock<String> = LazyLock::new(|| pretty(&DOCUMENT));
     &JSON
 }
 
-/// The same in OpenAPI 3.0.3.
+/// Returns the API document in OpenAPI 3.0.3.
 pub fn openapi_3_0_json() -> &'static str {
     static JSON: LazyLock<String> = LazyLock::new(|| pretty(&super::openapi::as_3_0(&DOCUMENT)));
     &JSON
@@ -115,39 +115,39 @@ fn pretty(document: &Value) -> String {
     text
 }
 
-/// The headers of answers that clients and the service may cache.
+/// Headers of cacheable responses.
 const ANSWER_HEADERS: [(&str, &str); 3] = [
     ("ETag", "Entity tag of this representation."),
     ("Cache-Status", "RFC 9211: `hit`, `fwd=miss`, `collapsed`."),
-    ("Server-Timing", "`solve;dur=` and the milliseconds of the solve."),
+    ("Server-Timing", "`solve;dur=` and the milliseconds of the computation."),
 ];
 
-/// Describes what every path can answer before its handler runs: an unknown query, a missing key, another host, too many connections.
+/// Adds the responses of the middleware to every path: unknown query, missing key, wrong host, too many connections.
 fn describe_entry(document: &mut openapi::OpenApi) {
     const KEY: &str = "key";
     let mut scheme = Http::new(HttpAuthScheme::Bearer);
-    scheme.description = Some("A key from the keys file, where the service has one; else none is wanted.".into());
+    scheme.description = Some("A key from the keys file. A service without a keys file needs no key.".into());
     document.components.get_or_insert_default().add_security_scheme(KEY, SecurityScheme::Http(scheme));
     let problem = |description: &str| {
         let content = Content::new(Some(Ref::from_schema_name("Problem")));
         ResponseBuilder::new().description(description).content(PROBLEM_JSON, content)
     };
-    let query = problem("A query that the path does not know.").build();
-    let host = problem("The service listens on this machine alone, and the host is another name.").build();
-    let wanted = problem("A key is wanted, and the request has none or one that opens nothing.").build();
+    let query = problem("The query is unknown or invalid.").build();
+    let host = problem("The service listens on the loopback address, and the request has another host name.").build();
+    let wanted = problem("The key is missing or unknown.").build();
     let seconds = HeaderBuilder::new().schema(Some(u32::schema())).description(Some("Seconds")).build();
-    let full = problem("As many connections are open as the service admits.").header("Retry-After", seconds).build();
+    let full = problem("The limit of open connections is reached.").header("Retry-After", seconds).build();
     for (path, item) in &mut document.paths.paths {
         for operation in [&mut item.get, &mut item.post, &mut item.delete].into_iter().flatten() {
             let responses = &mut operation.responses.responses;
             if !path.starts_with("/health/") {
-                // Either a key or none.
+                // A key or no key.
                 operation.security =
                     Some(vec![SecurityRequirement::default(), SecurityRequirement::new::<_, _, String>(KEY, [])]);
                 responses.insert("401".into(), wanted.clone().into());
             }
             responses.entry("400".into()).or_insert_with(|| query.clone().into());
-            // An answer that can be 304 has an entity tag, and comes from the cache or a computation.
+            // A response that can be 304 has an entity tag and a cache status.
             if responses.contains_key("304")
                 && let Some(RefOr::T(answer)) = responses.get_mut("200")
             {
@@ -162,9 +162,9 @@ fn describe_entry(document: &mut openapi::OpenApi) {
     }
 }
 
-/// The whole service.
+/// Makes the router of the whole service.
 pub fn router(app: Arc<App>, access: &Access) -> Router {
-    // The bundled page alone: without "none" it would ask a validator elsewhere.
+    // Without "none", Swagger UI would call an external validator.
     let config = Config::new(["openapi.json"]).validator_url("none");
     let wants_key = access.keys.is_some();
     let docs: Router<Arc<App>> = SwaggerUi::new("/docs").config(config).into();
@@ -184,7 +184,7 @@ pub fn router(app: Arc<App>, access: &Access) -> Router {
 }
 
 fn with_layers(paths: Router<Arc<App>>, app: Arc<App>, Access { cors_origins, keys, checks_host }: &Access) -> Router {
-    // Who is not let in by the keys still gets what the layers around give; where there are none, nothing is asked.
+    // Without keys there is no check. A refused request still gets the headers and the log line of the outer layers.
     let paths = match keys {
         Some(keys) => paths.layer(middleware::from_fn_with_state(keys.clone(), keys::require)),
         None => paths,
@@ -192,8 +192,9 @@ fn with_layers(paths: Router<Arc<App>>, app: Arc<App>, Access { cors_origins, ke
     let paths = if *checks_host { paths.layer(middleware::from_fn(require_host_of_this_machine)) } else { paths };
     paths
         .layer(
-            // From the outside in; one stack, because every layer of a router boxes all its routes once more. A panic becomes a problem
-            // before it is counted, logged and given its headers; one of the counting itself is catch_panic too.
+            // From the outside in, as one stack: every layer of a router boxes all routes again. The inner
+            // CatchPanicLayer makes a panic a problem before it is counted and logged. The outer one catches panics of
+            // the middleware itself.
             ServiceBuilder::new()
                 .layer(CatchPanicLayer::custom(panicked))
                 .layer(middleware::from_fn_with_state(Arc::clone(&app), observe::observe))
@@ -203,13 +204,13 @@ fn with_layers(paths: Router<Arc<App>>, app: Arc<App>, Access { cors_origins, ke
         .with_state(app)
 }
 
-/// A page of another site can have its own name resolve to this machine, and would then be of the same origin as the service. It cannot
-/// change the `Host` that the browser sends.
+/// Refuses requests with a host name that is not this machine, against DNS rebinding. Another site can point its name
+/// to this address, but cannot change the `Host` that the browser sends.
 async fn require_host_of_this_machine(request: Request, next: Next) -> Response {
     let mut hosts = request.headers().get_all(header::HOST).iter();
     let of_header = || hosts.next()?.to_str().ok()?.parse::<Authority>().ok().filter(|_| hosts.next().is_none());
     let host = request.uri().authority().cloned().or_else(of_header);
-    // Without any it is no browser.
+    // Browsers always send a host.
     let is_absent = host.is_none() && !request.headers().contains_key(header::HOST);
     let is_of_this_machine = |host: Authority| {
         let port = host.as_str().strip_prefix(host.host());
@@ -223,11 +224,11 @@ async fn require_host_of_this_machine(request: Request, next: Next) -> Response 
     if is_absent || host.is_some_and(is_of_this_machine) {
         return next.run(request).await;
     }
-    let detail = "the service listens on this machine alone: call it `localhost`, or by its address";
+    let detail = "the service listens on the loopback address alone. Use `localhost` or this address as the host name";
     Problem::new(ProblemCode::MisdirectedRequest, detail).into_response()
 }
 
-/// The middleware of paths that know no query.
+/// The middleware of paths without a query.
 async fn without_query(request: Request, next: Next) -> Response {
     match require_no_query(request.uri()) {
         Ok(()) => next.run(request).await,
@@ -247,19 +248,20 @@ async fn api_file(index: usize, headers: HeaderMap) -> Response {
 }
 
 async fn not_found(request: Request) -> Problem {
-    let detail = format!("nothing stands at `{}`; `/docs` lists the paths", request.uri().path());
+    let detail = format!("there is no path `{}`. `/docs` lists the paths", request.uri().path());
     Problem::new(ProblemCode::NotFound, detail)
 }
 
-/// Swagger UI styles its elements itself and draws with data URLs.
+/// Swagger UI sets styles itself and draws with data URLs.
 const DOCS_POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'",
 );
 
-/// The documentation's pages say 404 in words of their own, of names that are no text 400, and no policy.
+/// Replaces the 404 and 400 responses of Swagger UI by problems, and adds the policy.
 async fn as_documentation(mut response: Response) -> Response {
     if matches!(response.status(), StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST) {
-        return Problem::new(ProblemCode::NotFound, "the documentation has no such page").into_response();
+        return Problem::new(ProblemCode::NotFound, "the documentation has no such page. Start at `/docs`")
+            .into_response();
     }
     if response.status().is_redirection() {
         // From `/docs`, and relative, because a proxy may strip a prefix from the path.
@@ -270,7 +272,11 @@ async fn as_documentation(mut response: Response) -> Response {
 }
 
 async fn method_not_allowed(request: Request) -> Problem {
-    let detail = format!("`{}` does not know {}; `Allow` lists what it knows", request.uri().path(), request.method());
+    let detail = format!(
+        "`{}` does not support {}. The header `Allow` lists the supported methods",
+        request.uri().path(),
+        request.method()
+    );
     Problem::new(ProblemCode::MethodNotAllowed, detail)
 }
 
@@ -282,7 +288,7 @@ fn cors(origins: &[String]) -> CorsLayer {
     let allowed = if origins.iter().any(|origin| origin == "*") {
         AllowOrigin::any()
     } else {
-        // An origin that is no header value could never be sent by a browser either.
+        // A browser cannot send an origin that is not a header value.
         AllowOrigin::list(origins.iter().filter_map(|origin| HeaderValue::from_str(origin).ok()))
     };
     CorsLayer::new()

@@ -1,13 +1,14 @@
-//! The running service: accepts connections, and stops in order.
+//! The server: accepts connections, and shuts down gracefully.
 //!
-//! **Connections.** At most 1024 are open; the next one gets a fixed 503. The head of a request arrives within 30 s. A client that
-//! takes nothing of its answer for 30 s is disconnected by the kernel (`TCP_USER_TIMEOUT`). Slow clients are the proxy's work.
+//! **Connections.** At most 1024 are open; the next one gets a fixed 503. The request headers must arrive within 30 s.
+//! The kernel disconnects a client that takes no data for 30 s (`TCP_USER_TIMEOUT`). Slow clients are left to a
+//! buffering proxy.
 
 use std::io::{self, Write as _};
 use std::net::SocketAddr;
 use std::pin::pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::Router;
@@ -34,32 +35,25 @@ use crate::ops::config::{CLIENT_TIMEOUT_MS, MAX_CONNECTIONS, MAX_HEADER_BYTES, S
 use crate::ops::metrics;
 use crate::studies::{Storage, Store};
 
-/// The service listens at least this long after it says that it is not ready.
+/// Shortest time for which the service still listens after it reports that it is not ready.
 const NOTICE: Duration = Duration::from_millis(200);
 
-/// Running computations are stopped this long before the end of a shutdown, so that their clients get a response.
+/// Time before the end of a shutdown at which running computations are stopped, so that their clients get a response.
 const LAST_ANSWERS: Duration = Duration::from_millis(300);
 
-/// After an error of the listener itself, such as too many open files.
+/// Pause after an error of the listener, for example too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Time for a connection over the limit to take its refusal.
+/// Time limit for the refusal of a connection.
 const REFUSAL_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The response to a connection over the limit.
 const REFUSAL: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: application/problem+json\r\nretry-after: 1\r\ncontent-length: 219\r\nconnection: close\r\n\r\n{\"type\":\"urn:toothwave:problem:too_many_connections\",\"title\":\"Too many connections are open\",\"status\":503,\"detail\":\"1024 connections are open, the most that this service serves. Try again\",\"code\":\"too_many_connections\"}";
 
-static OPEN_CONNECTIONS: AtomicUsize = AtomicUsize::new(0);
-
-/// Connections that are open now.
-pub fn open_connections() -> usize {
-    OPEN_CONNECTIONS.load(Ordering::Relaxed)
-}
-
-/// Serves until a signal, then finishes running requests within the bound of the settings, or until a second signal.
+/// Serves until a signal. Then it finishes running requests within `shutdown_ms`, or until a second signal.
 pub async fn serve(settings: &Settings) -> io::Result<()> {
     metrics::install();
-    // First: without a handler, the first process of a container ignores signals.
+    // First: without a handler, process 1 of a container ignores signals.
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let mut stop_signal = async || {
         tokio::select! {
@@ -84,7 +78,7 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     watch_keys(settings)?;
     let stopping = async {
         stop_signal().await;
-        tracing::info!("stopping: not ready any more, still listening");
+        tracing::info!("stopping: not ready, still listening");
         app.ready.store(false, Ordering::Relaxed);
         tokio::select! {
             () = sleep(NOTICE.max(Duration::from_millis(settings.lame_duck_ms))) => false,
@@ -100,14 +94,14 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
         drop(listener);
         tokio::select! {
             () = server.finish(&app, Duration::from_millis(settings.shutdown_ms)) => {}
-            () = stop_signal() => tracing::warn!("second signal: running requests are given up"),
+            () = stop_signal() => tracing::warn!("second signal: running requests are aborted"),
         }
     }
     tracing::info!("stopped");
     Ok(())
 }
 
-/// Opens the file of studies, or a database in memory.
+/// Opens the database file of the studies, or a database in memory.
 fn study_storage(settings: &Settings) -> io::Result<Option<Storage>> {
     let file = match &settings.studies {
         Some(StudiesPlace::Off) => return Ok(None),
@@ -121,7 +115,7 @@ fn study_storage(settings: &Settings) -> io::Result<Option<Storage>> {
     Ok(Some(Storage { store, expiry: Duration::from_secs(settings.study_expiry_s) }))
 }
 
-/// Reads the keys file again at each hang-up signal.
+/// Reloads the keys file at each SIGHUP.
 fn watch_keys(settings: &Settings) -> io::Result<()> {
     let Some(keys) = settings.keys_file.clone() else { return Ok(()) };
     let mut hang_up = signal(SignalKind::hangup())?;
@@ -133,7 +127,7 @@ fn watch_keys(settings: &Settings) -> io::Result<()> {
     Ok(())
 }
 
-/// Raises the number of files that the process may open as far as it may; otherwise it stays.
+/// Raises the limit of open files to the maximum. On failure it stays.
 fn raise_file_limit() {
     let mut files = getrlimit(Resource::Nofile);
     files.current = files.maximum;
@@ -152,11 +146,11 @@ impl Server {
     fn new(app: &Arc<App>, settings: &Settings, address: SocketAddr) -> Self {
         let keys = settings.keys_file.clone();
         if keys.is_none() && !address.ip().is_loopback() {
-            tracing::warn!(%address, "anyone who reaches this address may use the service: no keys file is set");
+            tracing::warn!(%address, "no keys file is set: everyone who reaches this address can use the service");
         }
         let access = Access {
             cors_origins: settings.cors_origins.clone(),
-            // The page of another site could let its own name resolve to this machine, and has no key.
+            // Without keys, a DNS rebinding attack could reach a service on the loopback address.
             checks_host: keys.is_none() && address.ip().is_loopback(),
             keys,
         };
@@ -166,7 +160,7 @@ impl Server {
         Self {
             router: router::router(Arc::clone(app), &access),
             http,
-            connection_permits: Arc::new(Semaphore::new(MAX_CONNECTIONS)),
+            connection_permits: Arc::clone(&app.connection_permits),
             graceful: GracefulShutdown::new(),
             closing: CancellationToken::new(),
         }
@@ -187,7 +181,7 @@ impl Server {
         }
     }
 
-    /// Accepts the connections that wait in the kernel, because closing the listener would reset them.
+    /// Accepts the connections that wait in the kernel. Closing the listener would reset them.
     fn accept_waiting(&self, listener: &TcpListener) {
         for _ in 0..MAX_CONNECTIONS {
             let Some(Ok((stream, _))) = tokio::task::unconstrained(listener.accept()).now_or_never() else { return };
@@ -196,7 +190,7 @@ impl Server {
     }
 
     fn handle(&self, stream: TcpStream) {
-        // Without it small answers may wait for the acknowledgement of earlier ones.
+        // Without `TCP_NODELAY` small responses may wait for the acknowledgement of earlier ones.
         let _ = stream.set_nodelay(true);
         #[cfg(target_os = "linux")]
         let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(Duration::from_millis(CLIENT_TIMEOUT_MS)));
@@ -218,7 +212,6 @@ impl Server {
         let connection = self.http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
         let connection = self.graceful.watch(connection);
         let closing = self.closing.clone();
-        OPEN_CONNECTIONS.fetch_add(1, Ordering::Relaxed);
         tokio::spawn(async move {
             let _place = permit;
             let closed_without_request = async {
@@ -229,16 +222,15 @@ impl Server {
                 }
             };
             tokio::select! {
-                // An error of a connection is its client's to know. The request, if there was one, has its own line in the log.
+                // The client sees connection errors. A request has its own log line.
                 _ = connection => {}
-                // Browsers open connections in advance: they do not delay a shutdown.
+                // Browsers open connections in advance. They must not delay a shutdown.
                 () = closed_without_request => {}
             }
-            OPEN_CONNECTIONS.fetch_sub(1, Ordering::Relaxed);
         });
     }
 
-    /// Waits until all requests are answered; near the end of `bound` it stops their computations.
+    /// Waits until all requests are answered. Near the end of `bound` it stops their computations.
     async fn finish(self, app: &App, bound: Duration) {
         self.closing.cancel();
         app.studies.close();
@@ -248,14 +240,15 @@ impl Server {
         };
         let mut finished = pin!(finished);
         if timeout(bound.saturating_sub(LAST_ANSWERS), finished.as_mut()).await.is_err() {
-            tracing::warn!("requests still run: their computations are stopped");
+            tracing::warn!("shutdown time is nearly over: running computations are stopped");
             app.pool.stop();
             let _ = timeout(LAST_ANSWERS, finished).await;
         }
     }
 }
 
-/// Answers a connection over the limit. Its request is read first: closing a connection with unread bytes resets it.
+/// Sends the refusal to a connection over the limit. The request is read first: closing a connection with unread bytes
+/// resets it.
 async fn refuse(mut stream: TcpStream) -> io::Result<()> {
     let mut head = [0; 4096];
     let _ = stream.read(&mut head).await?;
@@ -267,14 +260,14 @@ async fn refuse(mut stream: TcpStream) -> io::Result<()> {
 fn print_address(address: SocketAddr) {
     let text = format!(
         "toothwave {} listens on http://{address}
-The designer's page: http://{address}/
-To try in another terminal:
+Page: http://{address}/
+Examples for another terminal:
   curl -s http://{address}/v1/examples/paper-5.1 | curl -s --json @- http://{address}/v1/coincidence-degree
   curl -s http://{address}/v1/examples/paper-5.1 | curl -s --json @- http://{address}/v1/sweep
-The API: http://{address}/docs
+API documentation: http://{address}/docs
 ",
         env!("CARGO_PKG_VERSION")
     );
-    // Standard output may be closed, or a pipe that nobody reads.
+    // A thread, because standard output may be a pipe that is not read.
     std::thread::spawn(move || io::stdout().write_all(text.as_bytes()));
 }

@@ -1,4 +1,5 @@
-//! The settings of the service: each is a flag and a `TOOTHWAVE_…` variable. Everything else is a constant.
+//! The settings of the service: each is a flag and a `TOOTHWAVE_…` variable. All other limits are constants, or parts of
+//! the memory limit.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
@@ -11,44 +12,44 @@ use tracing_subscriber::EnvFilter;
 use utoipa::ToSchema;
 
 use super::keys::Keys;
-use crate::compute::budget::PART_OF_UNKNOWN_SIZE;
+use crate::compute::budget::UNKNOWN_SIZE_DIVISOR;
 use crate::compute::machine;
 use crate::compute::pool::{MAX_RUNNING_BATCHES, MAX_WAITING_REQUESTS};
 
-/// Memory that one computation needs beside its answer.
+/// Memory of one computation without its answer, in bytes.
 const MEMORY_PER_SOLVE_BYTES: u64 = 128 << 20;
 
-/// Most bytes that the cache takes by default.
+/// Largest default size of the cache, in bytes.
 const MAX_DEFAULT_CACHE_BYTES: u64 = 256 << 20;
 
-/// Memory of a machine that does not say.
+/// Memory that is assumed if the machine does not report it, in bytes.
 const UNKNOWN_MEMORY_BYTES: u64 = 2 << 30;
 
-/// States, or points, of the largest answer by default.
+/// Default limit of states and of profile points.
 const MAX_DEFAULT_STATES: u64 = 1_000_000;
 
-/// What a state takes with its text.
+/// Bytes of a state with its text.
 const STATE_BYTES: u64 = 350;
 
-/// Variants of the largest study.
+/// Most variants of a study.
 const MAX_STUDY_VARIANTS: u64 = 10_000_000;
 
-/// Most bytes that the results of studies take.
+/// Most bytes of a study with its result, and of all studies together if they are in memory.
 const MAX_STUDY_BYTES: u64 = 256 << 20;
 
-/// Studies that may run at once.
+/// Most studies that run at once.
 const MAX_CONCURRENT_STUDIES: usize = 4;
 
-/// The longest time that a study may run.
+/// Time limit of a study.
 const STUDY_DEADLINE_MS: u64 = 3_600_000;
 
-/// Connections that may be open at once.
+/// Most open connections.
 pub const MAX_CONNECTIONS: usize = 1024;
 
-/// Bytes of the largest head of a request.
+/// Largest request head (request line and headers), in bytes.
 pub const MAX_HEADER_BYTES: usize = 40_960;
 
-/// Time in which the head of a request arrives, and in which a client takes what it was sent.
+/// Time limit for the request head, and for a client that takes no data.
 pub const CLIENT_TIMEOUT_MS: u64 = 30_000;
 
 /// The settings of `toothwave serve`.
@@ -58,55 +59,58 @@ pub struct Settings {
     #[arg(long, env = "TOOTHWAVE_LISTEN", value_name = "ADDR", default_value_t = SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)))]
     pub listen: SocketAddr,
 
-    /// Computations that run at once for requests, and as many for batches and studies [default: the cores granted, at most one for each 128 MiB of the memory limit]
+    /// Computations that run at once for requests; batches and studies get as many [default: granted cores, at most one
+    /// for each 128 MiB of the memory limit]
     #[arg(long, env = "TOOTHWAVE_MAX_CONCURRENT_SOLVES", value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub max_concurrent_solves: Option<u16>,
 
-    /// Milliseconds from the arrival of a request until its computation is stopped
+    /// Time limit of a request from its arrival, and of each line of a batch, in milliseconds
     #[arg(long, env = "TOOTHWAVE_DEADLINE_MS", value_name = "MS", default_value_t = 10_000)]
     pub deadline_ms: u64,
 
-    /// Bytes of the largest request body
+    /// Largest request body in bytes
     #[arg(long, env = "TOOTHWAVE_MAX_BODY_BYTES", value_name = "BYTES", default_value_t = 65_536)]
     pub max_body_bytes: usize,
 
-    /// States of the largest sweep, and points of the largest profile [default: 1000000, at most one for each 350 bytes of max-unread-bytes]
+    /// Most states of a sweep, and most points of a profile [default: 1000000, at most one for each 350 bytes of
+    /// max-unread-bytes]
     #[arg(long, env = "TOOTHWAVE_MAX_STATES", value_name = "N")]
     pub max_states: Option<u64>,
 
-    /// Bytes that all answers above 256 KiB take together until clients have read them [default: half of the memory limit]
+    /// Memory for all answers above 256 KiB until clients have read them, in bytes [default: half of the memory limit]
     #[arg(long, env = "TOOTHWAVE_MAX_UNREAD_BYTES", value_name = "BYTES")]
     pub max_unread_bytes: Option<u64>,
 
-    /// Bytes of answers that the cache keeps [default: an eighth of the memory limit, at most 256 MiB]
+    /// Size of the answer cache in bytes [default: one eighth of the memory limit, at most 256 MiB]
     #[arg(long, env = "TOOTHWAVE_CACHE_MAX_BYTES", value_name = "BYTES")]
     pub cache_max_bytes: Option<u64>,
 
-    /// File in which studies are kept, or `off` for a service without studies [default: in memory]
+    /// Database file of the studies, or `off` for a service without studies [default: in memory]
     #[arg(long, env = "TOOTHWAVE_STUDIES", value_name = "FILE|off", value_parser = studies)]
     pub studies: Option<StudiesPlace>,
 
-    /// Seconds after which a study that nobody asks for is removed
+    /// Time in seconds after which a study without requests is removed
     #[arg(long, env = "TOOTHWAVE_STUDY_EXPIRY_S", value_name = "S", default_value_t = 2_592_000)]
     pub study_expiry_s: u64,
 
-    /// File of key hashes (see `toothwave new-key`): with it every path but health and the page needs a bearer token
+    /// File of key hashes (see `toothwave new-key`); with it every path except health and page needs a bearer token
     #[arg(long, env = "TOOTHWAVE_KEYS_FILE", value_name = "FILE", value_parser = Keys::read)]
     pub keys_file: Option<Keys>,
 
-    /// Origin that browsers may call from, or `*`; repeat the flag for more, in the variable separate them by commas
+    /// Origin that browsers may call from, or `*`; repeat the flag for more, or separate them by commas in the variable
     #[arg(long = "cors-origin", env = "TOOTHWAVE_CORS_ORIGINS", value_name = "ORIGIN", value_delimiter = ',', value_parser = origin)]
     pub cors_origins: Vec<String>,
 
-    /// Milliseconds in which a stopping service still accepts requests, so that a load balancer can turn to others
+    /// Time in milliseconds for which a stopping service still accepts requests, so that a load balancer can switch
+    /// over
     #[arg(long, env = "TOOTHWAVE_LAME_DUCK_MS", value_name = "MS", default_value_t = 0)]
     pub lame_duck_ms: u64,
 
-    /// Milliseconds that running requests get to finish after a signal to stop
+    /// Time in milliseconds for running requests to finish after a stop signal
     #[arg(long, env = "TOOTHWAVE_SHUTDOWN_MS", value_name = "MS", default_value_t = 8_000)]
     pub shutdown_ms: u64,
 
-    /// What is logged, as tracing-subscriber's EnvFilter reads it
+    /// Log filter, in the syntax of tracing-subscriber's EnvFilter
     #[arg(long, env = "TOOTHWAVE_LOG", value_name = "FILTER", default_value = "info", value_parser = log_filter)]
     pub log: String,
 
@@ -115,16 +119,16 @@ pub struct Settings {
     pub removed: RemovedSettings,
 }
 
-/// Where studies are kept, if not in memory.
+/// Place where studies are stored, if not in memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum StudiesPlace {
-    /// Nowhere: there are none.
+    /// No studies.
     Off,
-    /// In this file.
+    /// A database file.
     File(PathBuf),
 }
 
-/// Settings of earlier builds: each ends the start with a sentence that names its replacement.
+/// Settings of earlier builds. Each ends the start with a message that names its replacement.
 #[derive(Debug, Clone, Args)]
 pub struct RemovedSettings {
     #[arg(long, env = "TOOTHWAVE_REPLICAS", hide = true, value_parser = |_: &str| removed("start one service with `--studies FILE` for all studies, and the others with `--studies off`"))]
@@ -142,55 +146,57 @@ fn removed(replacement: &str) -> Result<(), String> {
 fn studies(text: &str) -> Result<StudiesPlace, String> {
     match text {
         "off" => Ok(StudiesPlace::Off),
-        "" | ":memory:" => Err("name a file; without this setting studies are kept in memory".into()),
+        "" | ":memory:" => {
+            Err("the file name is missing: name a file, or leave the setting out to keep studies in memory".into())
+        }
         address if address.starts_with("postgres:") || address.starts_with("postgresql:") => {
-            Err("PostgreSQL is not supported any more: use `--studies FILE`".into())
+            Err("PostgreSQL is no longer supported: use `--studies FILE`".into())
         }
         file => Ok(StudiesPlace::File(file.into())),
     }
 }
 
-/// The limits that a client can read.
+/// Limits that clients can read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Limits {
     /// Most states of a sweep.
     pub max_states: u64,
-    /// Most points of all profiles of a geometry.
+    /// Most points of all profiles of a geometry together.
     pub max_profile_points: u64,
-    /// Largest request body.
+    /// Largest request body in bytes.
     pub max_body_bytes: usize,
-    /// Computations that run at once for requests, and as many for batches and studies.
+    /// Computations that run at once for requests. Batches and studies together get as many.
     pub max_concurrent_solves: usize,
-    /// Requests that may wait for a computation.
+    /// Most requests that wait for a computation.
     pub max_queued_solves: usize,
-    /// Batches that may run at once.
+    /// Most batches that run at once.
     pub max_concurrent_batches: usize,
-    /// Milliseconds from the arrival of a request until its computation is stopped.
+    /// Time limit of a request from its arrival, and of each line of a batch, in milliseconds.
     pub deadline_ms: u64,
-    /// Most bytes of answers that the cache keeps.
+    /// Size of the answer cache in bytes.
     pub cache_max_bytes: u64,
-    /// Most bytes that all answers above 256 KiB take together until clients have read them.
+    /// Memory for all answers above 256 KiB until clients have read them, in bytes.
     pub max_unread_bytes: u64,
     /// Most variants of a study.
     pub max_study_variants: u64,
-    /// Most bytes that the results of studies take.
+    /// Most bytes of a study with its result, and of all studies together if they are in memory.
     pub max_study_bytes: u64,
-    /// Studies that may run at once.
+    /// Most studies that run at once.
     pub max_concurrent_studies: usize,
-    /// Milliseconds after which a study breaks off.
+    /// Time limit of a study in milliseconds.
     pub study_deadline_ms: u64,
-    /// Connections that may be open at once.
+    /// Most open connections.
     pub max_connections: usize,
-    /// Bytes of a request's line and headers together.
+    /// Largest request line and headers together, in bytes.
     pub max_header_bytes: usize,
-    /// Milliseconds in which a request's line and headers have to arrive, and after which a silent connection is closed.
+    /// Time limit in milliseconds for the request line and headers, and for a silent connection.
     pub header_timeout_ms: u64,
 }
 
 impl Limits {
-    /// Those of the calculation.
+    /// Returns the limits of the calculation.
     pub const fn of_calculation(&self) -> question::Limits {
-        let searched_states = self.max_unread_bytes / PART_OF_UNKNOWN_SIZE / STATE_BYTES;
+        let searched_states = self.max_unread_bytes / UNKNOWN_SIZE_DIVISOR / STATE_BYTES;
         question::Limits {
             max_states: self.max_states,
             max_profile_points: self.max_profile_points,
@@ -198,7 +204,7 @@ impl Limits {
         }
     }
 
-    /// Those of studies.
+    /// Returns the limits of studies.
     pub const fn of_studies(&self) -> toothwave_study::Limits {
         let of_calculation = question::Limits { max_searched_states: self.max_states, ..self.of_calculation() };
         toothwave_study::Limits {
@@ -210,7 +216,7 @@ impl Limits {
 }
 
 impl Settings {
-    /// The limits that follow from the settings and from this machine.
+    /// Returns the limits that follow from the settings and the machine.
     pub fn limits(&self) -> Limits {
         self.limits_on(machine::memory_bytes().unwrap_or(UNKNOWN_MEMORY_BYTES), machine::cores())
     }
@@ -241,7 +247,7 @@ impl Settings {
     }
 }
 
-/// An origin as browsers write it in `Origin`, or `*`, which stands for all. One that is written otherwise would never match.
+/// Checks that an origin is `*` or is written as browsers send it. Another spelling would never match.
 fn origin(text: &str) -> Result<String, String> {
     let is_origin = || {
         let uri = text.parse::<Uri>().ok()?;
@@ -254,12 +260,12 @@ fn origin(text: &str) -> Result<String, String> {
     if text == "*" || is_origin() == Some(true) {
         Ok(text.into())
     } else {
-        Err("write an origin as browsers send it, such as `https://cad.example` or `http://localhost:8081`: scheme, host in small letters, port unless it is the scheme's own, no path. `*` alone allows all".into())
+        Err("the origin is not written as browsers send it. Use scheme, host in lower case, and the port if it is not the default, without a path: `https://cad.example` or `http://localhost:8081`. `*` allows all origins".into())
     }
 }
 
 fn log_filter(text: &str) -> Result<String, String> {
-    EnvFilter::try_new(text).map(|_| text.into()).map_err(|error| format!("no log filter: {error}"))
+    EnvFilter::try_new(text).map(|_| text.into()).map_err(|error| format!("invalid log filter: {error}"))
 }
 
 #[cfg(test)]

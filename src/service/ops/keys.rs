@@ -1,7 +1,7 @@
-//! Bearer keys, of which the service knows only hashes.
+//! Bearer keys. The service stores only their hashes.
 //!
-//! A keys file has one line for each key: the BLAKE3 hash of the key in hexadecimal, then a name. Lines that begin with `#` and empty
-//! ones are skipped. Keys are random and long (`toothwave new-key`), so that a fast hash cannot be searched.
+//! Each line of a keys file has the BLAKE3 hash of a key in hexadecimal, then a name. Empty lines and lines with `#`
+//! are skipped. `toothwave new-key` makes long random keys, so a fast hash is safe.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -19,14 +19,14 @@ use crate::http::problem::{Problem, ProblemCode};
 /// Random bytes of a new key.
 const KEY_BYTES: usize = 32;
 
-/// The keys that open the service; clones share them.
+/// The accepted keys. Clones share them.
 #[derive(Debug, Clone)]
 pub struct Keys {
     path: PathBuf,
     known: Arc<RwLock<Vec<Known>>>,
 }
 
-/// A line of the file.
+/// A line of the keys file.
 #[derive(Debug, Clone)]
 struct Known {
     hash: blake3::Hash,
@@ -40,19 +40,21 @@ impl Keys {
         Ok(Self { path: path.into(), known: Arc::new(RwLock::new(parse(&text)?)) })
     }
 
-    /// Reads the file again. If it is wrong, the keys stay as they were, and the log says so.
+    /// Reloads the keys file. If it is invalid, the keys stay the same, and the log has the reason.
     pub fn reload(&self) {
         let read = fs::read_to_string(&self.path).map_err(|error| error.to_string()).and_then(|text| parse(&text));
         match read {
             Ok(known) => {
-                tracing::info!(keys = known.len(), "read the keys file again");
+                tracing::info!(keys = known.len(), "reloaded the keys file");
                 *self.known.write() = known;
             }
-            Err(error) => tracing::error!(path = %self.path.display(), error, "the keys stay as they were"),
+            Err(error) => {
+                tracing::error!(path = %self.path.display(), error, "cannot reload the keys file: the keys stay the same")
+            }
         }
     }
 
-    /// The name of a key that is one of them. Every hash is compared, each in constant time.
+    /// Returns the name of a known key. Compares all hashes, each in constant time.
     fn name_of(&self, key: &str) -> Option<String> {
         let hash = blake3::hash(key.as_bytes());
         let known = self.known.read();
@@ -70,13 +72,17 @@ fn parse(text: &str) -> Result<Vec<Known>, String> {
         }
         let (hash, name) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let hash = blake3::Hash::from_hex(hash)
-            .map_err(|_| format!("line {number} does not begin with a hash of 64 hexadecimal digits"))?;
+            .map_err(|_| format!("line {number} does not begin with a hash of 64 hexadecimal digits. Make a line by `toothwave new-key NAME`"))?;
         keys.push(Known { hash, name: name.trim().into() });
     }
-    if keys.is_empty() { Err("the file has no key. Add one by `toothwave new-key NAME`".into()) } else { Ok(keys) }
+    if keys.is_empty() {
+        Err("the keys file has no key. Make one by `toothwave new-key NAME`".into())
+    } else {
+        Ok(keys)
+    }
 }
 
-/// A new key, and its line of a keys file.
+/// Makes a new key, and its line for a keys file.
 pub fn new_key(name: &str) -> Result<(String, String), getrandom::Error> {
     let mut bytes = [0; KEY_BYTES];
     getrandom::fill(&mut bytes)?;
@@ -89,12 +95,12 @@ pub fn new_key(name: &str) -> Result<(String, String), getrandom::Error> {
     Ok((key, line))
 }
 
-/// Whether a path needs a key. Health probes have none, and the page, which holds nothing secret, has to ask for one.
+/// True if a path needs a key. Health probes have no key, and the page must ask for one.
 fn needs_key(path: &str) -> bool {
     !(matches!(path, "/health/live" | "/health/ready" | "/") || path.starts_with("/page/"))
 }
 
-/// The middleware: every path but health and the page needs a key.
+/// The middleware that requires a key on every path except health and page.
 pub async fn require(State(keys): State<Keys>, request: Request, next: Next) -> Response {
     if !needs_key(request.uri().path()) {
         return next.run(request).await;
@@ -110,7 +116,7 @@ pub async fn require(State(keys): State<Keys>, request: Request, next: Next) -> 
     }
     let detail = match key {
         Some(_) => "the key is unknown. Ask the operator for one",
-        None => "the request has no key. Send one as `Authorization: Bearer KEY`",
+        None => "the request has no key. Send the header `Authorization: Bearer KEY`",
     };
     let mut response = Problem::new(ProblemCode::Unauthorized, detail).into_response();
     response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));

@@ -1,4 +1,4 @@
-//! The log: short lines on a terminal, JSON elsewhere. Writing it never blocks; lines that do not fit are dropped and counted.
+//! The log: short lines on a terminal, JSON elsewhere. Writing never blocks; excess lines are dropped and counted.
 
 use std::io::{self, IsTerminal as _};
 use std::panic;
@@ -7,12 +7,12 @@ use std::sync::OnceLock;
 use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::EnvFilter;
 
-/// Lines that may wait to be written: some megabytes.
+/// Most lines in the buffer: some megabytes.
 const MAX_WAITING_LINES: usize = 8_192;
 
 static DROPPED: OnceLock<ErrorCounter> = OnceLock::new();
 
-/// Logs to standard error from here on, panics included. Dropping the guard writes what waits.
+/// Starts the log to standard error, panics included. Dropping the guard writes the buffered lines.
 pub fn start(filter: EnvFilter) -> WorkerGuard {
     let builder = NonBlockingBuilder::default().lossy(true).buffered_lines_limit(MAX_WAITING_LINES);
     let (writer, guard) = builder.finish(io::stderr());
@@ -23,15 +23,15 @@ pub fn start(filter: EnvFilter) -> WorkerGuard {
     } else {
         log.json().with_span_list(false).init();
     }
-    // The standard hook writes to standard error itself, which may block.
+    // The standard hook writes to standard error directly, which may block.
     panic::set_hook(Box::new(|panic| {
-        let text = panic.payload_as_str().unwrap_or("without a text");
+        let text = panic.payload_as_str().unwrap_or("no text");
         tracing::error!(location = panic.location().map(ToString::to_string), text, "panic");
     }));
     guard
 }
 
-/// Lines that were dropped.
+/// Returns the number of dropped lines.
 pub fn lost_lines() -> u64 {
     DROPPED.get().map_or(0, |counter| counter.dropped_lines() as u64)
 }

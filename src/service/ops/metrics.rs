@@ -12,49 +12,49 @@ use toothwave_calculation::json::word;
 use super::log;
 use crate::app::App;
 use crate::http::problem::ProblemCode;
-use crate::http::server::open_connections;
+use crate::ops::config::MAX_CONNECTIONS;
 
-/// Upper bounds of the histograms' buckets in seconds: from a cache hit to the longest deadline.
+/// Upper bounds of the histogram buckets in seconds: from a cache hit to the default deadline.
 const BUCKETS_S: [f64; 12] = [1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 5e-2, 0.1, 0.5, 1.0, 10.0];
 
-/// Between two folds of recorded values into buckets; until then the recorder keeps each value.
+/// Interval at which recorded values are folded into buckets. Until then the recorder stores each value.
 const UPKEEP: Duration = Duration::from_secs(1);
 
 static RECORDER: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
 
-/// Installs the recorder of this process, once.
+/// Installs the metrics recorder of this process, once.
 pub fn install() {
     RECORDER.get_or_init(|| {
         PrometheusBuilder::new()
             .set_buckets_for_metric(Matcher::Suffix("_seconds".into()), &BUCKETS_S)
             .and_then(PrometheusBuilder::install_recorder)
             .inspect(|_| describe())
-            .inspect_err(|error| tracing::error!(%error, "no metrics"))
+            .inspect_err(|error| tracing::error!(%error, "cannot install the metrics recorder"))
             .ok()
     });
 }
 
 fn describe() {
     Collector::default().describe();
-    describe_counter!("toothwave_http_requests_total", "Requests answered.");
-    describe_histogram!("toothwave_http_request_duration_seconds", "Time to the head of an answer.");
-    describe_counter!("toothwave_cache_requests_total", "Answers that may be kept, by where they came from.");
-    describe_gauge!("toothwave_cache_bytes", "Bytes that the cache holds.");
-    describe_gauge!("toothwave_cache_entries", "Answers that the cache holds.");
-    describe_histogram!("toothwave_solve_duration_seconds", "Time of each computation, without waiting.");
-    describe_gauge!("toothwave_solves_running", "Computations that run.");
+    describe_counter!("toothwave_http_requests_total", "Requests.");
+    describe_histogram!("toothwave_http_request_duration_seconds", "Time from a request to its response headers.");
+    describe_counter!("toothwave_cache_requests_total", "Responses of cacheable endpoints, by cache status.");
+    describe_gauge!("toothwave_cache_bytes", "Bytes in the cache.");
+    describe_gauge!("toothwave_cache_entries", "Answers in the cache.");
+    describe_histogram!("toothwave_solve_duration_seconds", "Time of each computation, without the wait for a permit.");
+    describe_gauge!("toothwave_solves_running", "Running computations.");
     describe_gauge!("toothwave_solves_queued", "Requests that wait for a permit.");
-    describe_gauge!("toothwave_batches_running", "Batches that run.");
-    describe_counter!("toothwave_batch_documents_total", "Documents of batches answered.");
-    describe_gauge!("toothwave_studies_running", "Studies that run.");
-    describe_counter!("toothwave_study_variants_total", "Variants of studies computed.");
-    describe_counter!("toothwave_refusals_total", "Requests refused, by the reason.");
-    describe_counter!("toothwave_cancellations_total", "Computations that were stopped.");
-    describe_gauge!("toothwave_connections", "Connections that are open.");
-    describe_gauge!("toothwave_unread_bytes", "Bytes reserved of max_unread_bytes.");
-    describe_counter!("toothwave_log_lines_lost_total", "Lines of the log that were dropped.");
-    describe_gauge!("toothwave_build_info", "1; its labels say what runs.");
-    // The rate of a series that does not exist yet misses its first event.
+    describe_gauge!("toothwave_batches_running", "Running batches.");
+    describe_counter!("toothwave_batch_documents_total", "Answered documents of batches, by status.");
+    describe_gauge!("toothwave_studies_running", "Running studies.");
+    describe_counter!("toothwave_study_variants_total", "Computed variants of studies.");
+    describe_counter!("toothwave_refusals_total", "Refused requests, by reason.");
+    describe_counter!("toothwave_cancellations_total", "Computations that were stopped early.");
+    describe_gauge!("toothwave_connections", "Open connections.");
+    describe_gauge!("toothwave_unread_bytes", "Reserved bytes of max_unread_bytes.");
+    describe_counter!("toothwave_log_lines_lost_total", "Dropped log lines.");
+    describe_gauge!("toothwave_build_info", "Always 1. The labels have version and build.");
+    // A series that does not exist yet would miss its first event in a rate.
     for name in ["toothwave_cancellations_total", "toothwave_study_variants_total"] {
         counter!(name).increment(0);
     }
@@ -63,12 +63,12 @@ fn describe() {
     }
 }
 
-/// The counter of refusals with this code.
+/// Returns the counter of refusals with this code.
 pub fn refusals(code: ProblemCode) -> Counter {
     counter!("toothwave_refusals_total", "reason" => word(&code))
 }
 
-/// What tells requests of one route apart; no status if the client left before.
+/// Labels of a request, apart from its route. Without a status if the client left early.
 #[derive(Debug, Clone, Copy)]
 pub struct Labels {
     /// The method.
@@ -79,7 +79,7 @@ pub struct Labels {
     pub cache: Option<&'static str>,
 }
 
-/// Counts a request. Routes, methods and statuses are few, so that there are few series.
+/// Counts a request. Routes, methods and statuses are few, so there are few series.
 pub fn count_request(route: &str, Labels { method, status, cache }: Labels, elapsed: Duration) {
     let status = status.map_or_else(|| "none".to_owned(), |status| status.to_string());
     let route = route.to_owned();
@@ -90,7 +90,7 @@ pub fn count_request(route: &str, Labels { method, status, cache }: Labels, elap
     }
 }
 
-/// The metrics as text; gauges are read at this moment.
+/// Returns the metrics as text. Gauges are read at this moment.
 pub fn render(app: &App) -> String {
     let (cache_bytes, cache_entries) = app.cache.size();
     #[expect(clippy::cast_precision_loss, reason = "gauges are doubles")]
@@ -102,7 +102,7 @@ pub fn render(app: &App) -> String {
         ("toothwave_solves_running", app.pool.running() as u64),
         ("toothwave_solves_queued", app.pool.waiting() as u64),
         ("toothwave_unread_bytes", app.budget.reserved_bytes()),
-        ("toothwave_connections", open_connections() as u64),
+        ("toothwave_connections", (MAX_CONNECTIONS - app.connection_permits.available_permits()) as u64),
     ] {
         gauge!(name).set(value as f64);
     }
@@ -113,7 +113,7 @@ pub fn render(app: &App) -> String {
     handle.map(PrometheusHandle::render).unwrap_or_default()
 }
 
-/// Folds recorded values into buckets, for ever.
+/// Folds recorded values into buckets, in an endless loop.
 pub async fn upkeep() {
     loop {
         tokio::time::sleep(UPKEEP).await;

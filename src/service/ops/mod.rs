@@ -1,4 +1,4 @@
-//! What operators see: settings, log, metrics, keys.
+//! Operation of the service: settings, log, metrics, keys.
 
 pub mod config;
 pub mod keys;

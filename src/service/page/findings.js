@@ -152,7 +152,7 @@ const KINDS = {
   deprecated_field: {
     title: 'Deprecated field',
     tests: 'Whether the document has a field that the next version will not know.',
-    basis: ['documentation', 'docs/migration.md names what takes its place.'],
+    basis: ['documentation', 'docs/how-to/migration.md names what takes its place.'],
     why: 'The answer is right, and the next version will refuse the document.',
   },
   set_back_twice: {

@@ -1,4 +1,4 @@
-//! `GET /`: the designer's page, compiled in, so that it needs neither Node nor any network.
+//! `GET /`: the web page, compiled in, so that it needs no Node and no network.
 
 pub mod static_file;
 
@@ -13,7 +13,7 @@ use axum::response::{IntoResponse, Response};
 use self::static_file::StaticFile;
 use crate::http::problem::{Problem, ProblemCode};
 
-/// Everything the page may load comes from this origin; nothing may be inline, framed or sent elsewhere.
+/// Everything loads from this origin. Inline scripts, frames and forms are forbidden.
 const CONTENT_SECURITY_POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -98,19 +98,19 @@ static FILES: LazyLock<BTreeMap<&str, StaticFile>> = LazyLock::new(|| {
     ASSETS.iter().chain([&INDEX]).map(file).collect()
 });
 
-/// The page itself.
+/// Serves the page.
 pub async fn index(headers: HeaderMap) -> Response {
     serve(&FILES[INDEX.name], &headers)
 }
 
-/// The files that it loads.
+/// Serves the files of the page.
 pub async fn asset(name: Result<Path<String>, PathRejection>, uri: Uri, headers: HeaderMap) -> Response {
-    // A name that is no text is no file's either.
+    // A path segment that is not UTF-8 is an unknown file.
     let name = name.map(|Path(name)| name).unwrap_or_default();
     match FILES.get(name.as_str()) {
         Some(file) if name != INDEX.name => serve(file, &headers),
         _ => {
-            let detail = format!("nothing stands at `{}`; the page is at `/`", uri.path());
+            let detail = format!("there is no file `{}`. The page is at `/`", uri.path());
             Problem::new(ProblemCode::NotFound, detail).into_response()
         }
     }
@@ -118,7 +118,7 @@ pub async fn asset(name: Result<Path<String>, PathRejection>, uri: Uri, headers:
 
 fn serve(file: &StaticFile, headers: &HeaderMap) -> Response {
     let mut response = file.answer(headers);
-    // On 304 too: browsers take its headers over those that they kept.
+    // Also on 304: browsers replace their stored headers by these.
     response.headers_mut().insert(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY);
     response
 }
@@ -140,7 +140,7 @@ mod tests {
             .collect()
     }
 
-    /// A module that is not served fails only in a browser.
+    /// A module that is not served would fail only in a browser.
     #[test]
     fn every_file_of_the_page_is_served() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("page");

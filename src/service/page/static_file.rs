@@ -1,4 +1,4 @@
-//! Files that stay as they are while the service runs: plain and compressed, with entity tags.
+//! Static files, uncompressed and compressed, with entity tags.
 
 use std::io::Write as _;
 
@@ -30,7 +30,7 @@ impl StaticFile {
         let body = body.into();
         let hash = blake3::hash(&body).to_hex();
         let mut encoder = GzEncoder::new(Vec::with_capacity(body.len() / 2), Compression::best());
-        // A write to memory does not fail; if it did, the plain file would be served.
+        // Writing to memory does not fail. If it did, the uncompressed file would be served.
         let gzip = encoder.write_all(&body).and_then(|()| encoder.finish()).unwrap_or_default();
         Self {
             content_type,
@@ -39,7 +39,8 @@ impl StaticFile {
         }
     }
 
-    /// The coding that the request accepts, or 304 where the client has it. Clients ask each time, so that files of two builds never mix.
+    /// Returns the file in an accepted coding, or 304. `no-cache` makes clients revalidate, so that files of two builds
+    /// never mix.
     pub fn answer(&self, headers: &HeaderMap) -> Response {
         let is_gzip = !self.gzip.body.is_empty() && negotiation::accepts_gzip(headers);
         let Coded { body, etag } = if is_gzip { &self.gzip } else { &self.plain };

@@ -1,6 +1,7 @@
-//! The studies of the service. They run in this process and are stored in an SQLite file, or in memory.
+//! Studies run in this process and are stored in an SQLite file, or in memory.
 //!
-//! This module has the record of every study. The file has their documents and parts. After a restart, studies that ran continue.
+//! This module has a record for every study. The database has their documents and parts. After a restart, running
+//! studies continue.
 
 mod part_bytes;
 mod record;
@@ -26,15 +27,15 @@ use crate::compute::pool::Pool;
 use crate::http::problem::{Problem, ProblemCode};
 use crate::ops::config::Limits;
 
-/// Time between two removals of expired studies.
+/// Interval at which expired studies are removed.
 const EXPIRY_CHECK: Duration = Duration::from_secs(60);
 
-/// Where studies are stored.
+/// Storage of the studies.
 #[derive(Debug)]
 pub struct Storage {
-    /// The file.
+    /// The database.
     pub store: Store,
-    /// After this time without a request a study is removed.
+    /// Time without a request after which a study is removed.
     pub expiry: Duration,
 }
 
@@ -44,9 +45,9 @@ pub struct Studies {
     pool: Pool,
     limits: Limits,
     storage: Option<Storage>,
-    /// In the order of their latest `POST`, the oldest first.
+    /// Ordered by their latest `POST`, the oldest first.
     records: Mutex<Vec<Arc<StudyRecord>>>,
-    /// Held while a study begins, is cancelled or is removed: one at a time.
+    /// Held while a study begins, is cancelled or is removed.
     changes: tokio::sync::Mutex<()>,
     runs: TaskTracker,
     /// Cancelled when the service stops.
@@ -54,7 +55,7 @@ pub struct Studies {
 }
 
 impl Studies {
-    /// No studies yet. Without a storage there never are any.
+    /// Makes an empty list of studies. Without a storage it stays empty.
     pub fn new(pool: Pool, limits: Limits, storage: Option<Storage>) -> Self {
         Self {
             pool,
@@ -67,7 +68,8 @@ impl Studies {
         }
     }
 
-    /// Loads the stored studies, and continues those that ran. Expired ones and those with a damaged document are removed.
+    /// Loads the stored studies and continues the running ones. Removes expired studies and those with a damaged
+    /// document.
     pub async fn load(&self) -> Result<(), StoreError> {
         let Some(Storage { store, .. }) = &self.storage else { return Ok(()) };
         for stored in store.with(store::load).await? {
@@ -83,14 +85,14 @@ impl Studies {
         Ok(())
     }
 
-    /// How many studies run.
+    /// Returns the number of running studies.
     pub fn running(&self) -> usize {
         self.records.lock().iter().filter(|record| record.is_running()).count()
     }
 
     fn storage(&self) -> Result<&Storage, Problem> {
         self.storage.as_ref().ok_or_else(|| {
-            let detail = "this service takes no studies, because it was started with `--studies off`";
+            let detail = "this service has no studies, because it was started with `--studies off`. Start it with `--studies FILE`";
             Problem::new(ProblemCode::StudiesOff, detail)
         })
     }
@@ -99,13 +101,13 @@ impl Studies {
         self.records.lock().iter().find(|record| record.id == id).cloned()
     }
 
-    /// The study with this id, which a client requests now.
+    /// Returns the study with this id, and sets the time of its latest request.
     pub fn find(&self, id: &str) -> Result<Option<Arc<StudyRecord>>, Problem> {
         self.storage()?;
         Ok(self.record(id).inspect(|record| self.touch(record)))
     }
 
-    /// Sets the time of the latest request to now. Nobody waits until it is stored.
+    /// Sets the time of the latest request to now. Storing it runs in the background.
     pub fn touch(&self, record: &StudyRecord) {
         let Some(Storage { store, .. }) = &self.storage else { return };
         let now_s = now_s();
@@ -115,13 +117,13 @@ impl Studies {
         let (store, id) = (store.clone(), record.id.clone());
         self.runs.spawn(async move {
             if let Err(error) = store.with(move |transaction| store::set_asked_at(transaction, &id, now_s)).await {
-                tracing::warn!(%error, "the time of a request for a study was not stored");
+                tracing::warn!(%error, "cannot store the time of a study's latest request");
             }
         });
     }
 
-    /// The study, which runs from now on if it is not done. If it has parts, it continues with them.
-    /// Fails with `queue_full` if too many studies run, or if memory has no space for another one.
+    /// Begins or continues a study, and returns its record. A finished one is returned as it is. Fails with
+    /// `queue_full` if too many studies run, or if memory has no space for another one.
     pub async fn begin(&self, study: Study, document: &[u8]) -> Result<Arc<StudyRecord>, Problem> {
         let Storage { store, .. } = self.storage()?;
         let id = study.id().to_string();
@@ -136,9 +138,7 @@ impl Studies {
         }
         let most = self.limits.max_concurrent_studies;
         if self.running() >= most {
-            let detail = format!(
-                "{most} studies run, the most that this service runs at once. Try again in a second, or cancel one"
-            );
+            let detail = format!("{most} studies run, which is the limit. Retry after 1 s, or cancel one");
             return Err(Problem::new(ProblemCode::QueueFull, detail));
         }
         if store.is_in_memory() {
@@ -151,7 +151,7 @@ impl Studies {
         Ok(self.insert(store, stored, study))
     }
 
-    /// The oldest studies that leave memory so that another one has space: as few as possible, and none that runs.
+    /// Returns the oldest studies that must leave memory for another one: as few as possible, and no running ones.
     fn to_remove_for(&self, study: &Study) -> Result<Vec<Arc<StudyRecord>>, Problem> {
         let (id, bytes, most_bytes) = (study.id().to_string(), record::bytes(study), self.limits.max_study_bytes);
         let others = self.records.lock().iter().filter(|record| record.id != id).cloned().collect::<Vec<_>>();
@@ -160,7 +160,7 @@ impl Studies {
         let needed_bytes = bytes + sum(&running);
         if needed_bytes > most_bytes {
             let detail = format!(
-                "the study takes {bytes} bytes: with those that run more than the {most_bytes} of `max_study_bytes`. Try again when one of them is done"
+                "the study needs {bytes} bytes, and with the running studies this exceeds `max_study_bytes` ({most_bytes} bytes). Retry when one of them is done"
             );
             return Err(Problem::new(ProblemCode::QueueFull, detail));
         }
@@ -173,7 +173,7 @@ impl Studies {
         Ok(idle.into_iter().take_while(is_needed).collect())
     }
 
-    /// Adds the record of a study, in the place of an earlier one, and runs the study if that is its state.
+    /// Adds the record of a study in place of an earlier one, and runs the study if its state is running.
     fn insert(&self, store: &Store, stored: StoredStudy, study: Study) -> Arc<StudyRecord> {
         let time = Duration::from_secs(stored.ends_at_s.saturating_sub(now_s()));
         let record = Arc::new(StudyRecord::new(stored, &study, self.closing.child_token()));
@@ -188,7 +188,7 @@ impl Studies {
         record
     }
 
-    /// Cancels a study that runs, and removes one that does not. False if there is no such study.
+    /// Cancels a running study, or removes another one. Returns false if the id is unknown.
     pub async fn cancel_or_remove(&self, id: &str) -> Result<bool, Problem> {
         let Storage { store, .. } = self.storage()?;
         let _one_at_a_time = self.changes.lock().await;
@@ -201,7 +201,7 @@ impl Studies {
         tokio::select! {
             () = record.ended() => Ok(true),
             () = self.closing.cancelled() => {
-                let detail = "the service is stopping, and the study continues when it starts again. Cancel it then";
+                let detail = "the service is stopping, and the study continues after the restart. Cancel it then";
                 Err(Problem::new(ProblemCode::ShuttingDown, detail))
             }
         }
@@ -214,13 +214,13 @@ impl Studies {
         Ok(())
     }
 
-    /// The answer from the parts that are stored, computed on this thread.
-    /// Fails if the file fails or is damaged, if the study was removed, or if `stop` is set.
+    /// Computes the answer from the stored parts, on this thread. Fails if the database fails or is damaged, if the
+    /// study was removed, or if `stop` is set.
     pub fn answer(&self, record: &StudyRecord, stop: &AtomicBool) -> Result<StudyAnswer, Problem> {
         runner::answer(&self.storage()?.store, record, stop)
     }
 
-    /// Removes expired studies, again and again until the service stops.
+    /// Removes expired studies at intervals until the service stops.
     pub async fn keep_removing_expired(&self) {
         while timeout(EXPIRY_CHECK, self.closing.cancelled()).await.is_err() {
             self.remove_expired().await;
@@ -241,13 +241,13 @@ impl Studies {
         }
     }
 
-    /// Stops all studies, which continue after a restart, and ends all waiting for them.
+    /// Stops all studies, and ends all waits for them. The studies continue after a restart.
     pub fn close(&self) {
         self.closing.cancel();
         self.runs.close();
     }
 
-    /// Completes when all studies have stopped and the file has all that they stored.
+    /// Completes when all studies have stopped and the database is written.
     pub async fn closed(&self) {
         self.runs.wait().await;
         if let Some(Storage { store, .. }) = &self.storage {
@@ -255,7 +255,7 @@ impl Studies {
         }
     }
 
-    /// Cancelled when the service stops.
+    /// Token that is cancelled when the service stops.
     pub const fn closing(&self) -> &CancellationToken {
         &self.closing
     }

@@ -1,9 +1,9 @@
-//! Encodes parts with a hash, because SQLite does not notice damaged content.
+//! Encoding of parts with a hash, because SQLite does not notice damaged content.
 
 use toothwave_calculation::origin;
 use toothwave_study::Part;
 
-/// The bytes of a chunk's part, followed by their hash.
+/// Returns the bytes of a chunk's part, followed by their hash.
 pub(super) fn encode(study: &str, chunk: u64, part: &Part) -> postcard::Result<Vec<u8>> {
     let mut bytes = postcard::to_extend(part, Vec::with_capacity(part.bytes() + blake3::OUT_LEN))?;
     let hash = hash(study, chunk, &bytes);
@@ -11,7 +11,7 @@ pub(super) fn encode(study: &str, chunk: u64, part: &Part) -> postcard::Result<V
     Ok(bytes)
 }
 
-/// The part of these bytes; none if they are damaged, or belong to another chunk, study, build or arithmetic.
+/// Returns the part of these bytes, or none if they are damaged or belong to another chunk, study, build or arithmetic.
 pub(super) fn decode(study: &str, chunk: u64, bytes: &[u8]) -> Option<Part> {
     let (bytes, stored_hash) = bytes.split_last_chunk::<{ blake3::OUT_LEN }>()?;
     if hash(study, chunk, bytes) == *stored_hash { postcard::from_bytes(bytes).ok() } else { None }

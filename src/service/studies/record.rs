@@ -1,4 +1,4 @@
-//! A study record: the state of one study, which its run changes and clients watch.
+//! The record of a study: the state that its run changes and clients watch.
 
 use std::sync::atomic::AtomicU64;
 
@@ -11,21 +11,21 @@ use utoipa::ToSchema;
 use super::store::StoredStudy;
 use crate::http::problem::Problem;
 
-/// How a study stands.
+/// State of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StudyState {
-    /// Variants are looked at.
+    /// Variants are being computed.
     Running,
-    /// All were looked at.
+    /// All variants are computed.
     Done,
-    /// It was told to stop; the same question lets it go on.
+    /// A client cancelled the study. The same study document continues it.
     Cancelled,
-    /// It broke off; the same question lets it go on.
+    /// The study failed. The same study document continues it.
     Failed,
 }
 
-/// A study that the service has.
+/// Record of one study.
 #[derive(Debug)]
 pub struct StudyRecord {
     pub(super) id: String,
@@ -35,7 +35,7 @@ pub struct StudyRecord {
     /// Seconds since 1970.
     pub(super) asked_at_s: AtomicU64,
     status: watch::Sender<Status>,
-    /// Cancelled to end the run.
+    /// Cancelled to stop the run.
     pub(super) stop: CancellationToken,
 }
 
@@ -43,49 +43,49 @@ pub struct StudyRecord {
 struct Status {
     state: StudyState,
     problem: Option<Problem>,
-    /// The parts that are stored.
+    /// Progress of the stored parts.
     progress: Progress,
 }
 
-/// How many variants have been computed, and how many of these have no answer.
+/// Computed variants, and those of them without an answer.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Progress {
     pub(super) variants: u64,
     pub(super) impossible: u64,
 }
 
-/// A study as it stands.
+/// Current state of a study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct StudyResource {
-    /// What tells it from every other study: a hash of what is asked.
+    /// Identifier: a hash of the study document.
     pub id: String,
-    /// Its kind.
+    /// Kind of study.
     pub study: String,
-    /// How it stands.
+    /// State.
     pub state: StudyState,
-    /// Variants that it looks at.
+    /// Variants of the study.
     pub variants: u64,
-    /// Variants that were looked at: of a search also those that it judges once more in the end, at true peaks.
+    /// Computed variants. A search also counts the variants that it evaluates again with accurate peaks.
     pub looked_at: u64,
-    /// Of those that the result holds, the ones without an answer.
+    /// Computed variants without an answer. A search counts those of its scan alone.
     pub impossible: u64,
-    /// Where the result stands below the service's address, as far as it has come.
+    /// Path of the result below the service's address. It is partial while the study runs.
     pub result_href: String,
-    /// Where it tells of its progress, below the service's address.
+    /// Path of the progress events below the service's address.
     pub events_href: String,
-    /// Why it broke off.
+    /// Problem of a failed study.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub problem: Option<Problem>,
-    /// The result, where the study was asked for and does not run any more.
+    /// Result, in the response to a `POST` after the study has ended.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub result: Option<StudyAnswer>,
 }
 
-/// About the memory that a study takes with its result.
+/// Estimates the memory of a study with its result, in bytes.
 pub(super) fn bytes(study: &Study) -> u64 {
-    /// The document and the record.
+    /// Bytes of the document and the record.
     const OTHER_BYTES: u64 = 4096;
     OTHER_BYTES + study.kept_bytes()
 }
@@ -104,12 +104,12 @@ impl StudyRecord {
         }
     }
 
-    /// About the memory that the study takes with its result.
+    /// Estimated memory of the study with its result, in bytes.
     pub const fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// The state as clients get it, without the result.
+    /// Returns the state without the result.
     pub fn resource(&self) -> StudyResource {
         let Status { state, problem, progress } = self.status.borrow().clone();
         StudyResource {
@@ -130,7 +130,7 @@ impl StudyRecord {
         self.status.borrow().state
     }
 
-    /// Whether the study runs.
+    /// True if the study runs.
     pub(super) fn is_running(&self) -> bool {
         self.state() == StudyState::Running
     }
@@ -139,18 +139,18 @@ impl StudyRecord {
     pub fn changed(&self) -> impl Future<Output = ()> + Send + use<> {
         let mut status = self.status.subscribe();
         async move {
-            // An error means that the record was removed: there are no further changes.
+            // An error means that the record was removed, so there are no further changes.
             let _ = status.changed().await;
         }
     }
 
-    /// Completes when the study does not run.
+    /// Completes when the study has ended.
     pub async fn ended(&self) {
         // An error means that the record was removed.
         let _ = self.status.subscribe().wait_for(|status| status.state != StudyState::Running).await;
     }
 
-    /// Counts a part that was stored.
+    /// Counts a stored part.
     pub(super) fn count(&self, part: Progress) {
         self.status.send_modify(|Status { progress, .. }| {
             progress.variants += part.variants;

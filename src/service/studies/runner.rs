@@ -1,4 +1,4 @@
-//! Runs a study: its chunks are computed in the background and stored, and its answer is made from the stored parts.
+//! The run of a study: computes chunks in the background and stores their parts. The answer is made from the parts.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,21 +17,21 @@ use super::store::{self, NewPart, Store};
 use crate::compute::pool::Pool;
 use crate::http::problem::{Problem, ProblemCode};
 
-/// A study that runs.
+/// A running study.
 pub(super) struct Run {
     pub(super) store: Store,
     pub(super) pool: Pool,
     pub(super) record: Arc<StudyRecord>,
     pub(super) study: Arc<Study>,
-    /// After this time the study fails.
+    /// Time limit of the study.
     pub(super) time: Duration,
 }
 
 impl Run {
-    /// Runs until the study ends, or until the service stops: then it continues after the restart.
+    /// Runs until the study ends or the service stops. After a restart it continues.
     pub(super) async fn complete(self, service_stops: CancellationToken) {
         let ended = timeout(self.time, self.compute_missing_chunks()).await.unwrap_or_else(|_| {
-            let detail = "the study did not finish within `study_deadline_ms`. What it has computed is stored. Request it again to continue";
+            let detail = "the study did not finish within `study_deadline_ms`. Its results so far are stored. Request it again to continue";
             Err(Problem::new(ProblemCode::DeadlineExceeded, detail))
         });
         let (state, problem) = match ended {
@@ -46,12 +46,12 @@ impl Run {
         }
         let stored = self.store.with(move |transaction| store::end(transaction, &id, state, stored_problem)).await;
         if let Err(error) = stored {
-            tracing::warn!(%error, "the end of a study was not stored: it continues after a restart");
+            tracing::warn!(%error, "cannot store the end of a study: it continues after a restart");
         }
         self.record.set_state(state, problem);
     }
 
-    /// Computes until all chunks have a part; false if the run was cancelled before.
+    /// Computes until all chunks have a part. Returns false if the run was cancelled before.
     async fn compute_missing_chunks(&self) -> Result<bool, Problem> {
         let id = self.record.id.clone();
         let done = self.store.with(move |transaction| store::chunks_done(transaction, &id)).await?;
@@ -60,7 +60,7 @@ impl Run {
         let mut computed = computed.buffer_unordered(self.pool.permits());
         loop {
             let next = tokio::select! {
-                // First: a study that is cancelled stores nothing more.
+                // Cancellation first, so that a cancelled study stores nothing more.
                 biased;
                 () = self.record.stop.cancelled() => return Ok(false),
                 next = computed.next() => next,
@@ -74,7 +74,7 @@ impl Run {
 
     async fn compute(&self, chunk: u64) -> Result<NewPart, Problem> {
         let work = Work::new(&self.study, chunk);
-        // Not the id of `study`: a study that another build began has the id that this build gave it.
+        // `study.id()` may differ: a study from another build keeps its first id.
         let study = self.record.id.clone();
         let job = move |stop: &AtomicBool| {
             let part = work.run(stop).map_err(|_| NoAnswer::stopped())?;
@@ -83,12 +83,12 @@ impl Run {
             let bytes = part_bytes::encode(&study, chunk, &part).map_err(|error| Problem::internal(&error))?;
             Ok(NewPart { study, chunk, progress, bytes })
         };
-        // The run has a time limit of its own.
+        // The run has its own time limit.
         self.pool.run_in_background(Duration::MAX, job).await
     }
 }
 
-/// The answer from the parts that are stored, computed on this thread.
+/// Computes the answer from the stored parts, on this thread.
 pub(super) fn answer(store: &Store, record: &StudyRecord, stop: &AtomicBool) -> Result<StudyAnswer, Problem> {
     let id = &*record.id;
     let is_done = record.state() == StudyState::Done;
@@ -108,7 +108,7 @@ pub(super) fn answer(store: &Store, record: &StudyRecord, stop: &AtomicBool) -> 
         }
     }
     if is_done && !gathered.is_complete() {
-        // Either the study was removed meanwhile, or its parts were lost.
+        // Either the study was removed meanwhile, or parts were lost.
         stored()?;
         return Err(damaged(id, "the number of parts"));
     }
@@ -120,7 +120,7 @@ fn removed(id: &str) -> Problem {
     Problem::new(ProblemCode::NotFound, detail)
 }
 
-/// The problem of a study whose stored content has changed.
+/// Returns the problem of a study with damaged stored content.
 pub(super) fn damaged(id: &str, what: &str) -> Problem {
     let detail = "the stored study is damaged. Delete it and request it again";
     let cause = format!("the study {id} is damaged in its file: {what}");

@@ -1,4 +1,4 @@
-//! The file of studies: an SQLite database that one process has open at a time. Without a file it is in memory.
+//! The database of studies: an SQLite file that one process opens at a time, or a database in memory.
 
 use std::collections::HashSet;
 use std::fs::OpenOptions;
@@ -22,10 +22,10 @@ use super::runner::damaged;
 use crate::http::problem::{Problem, ProblemCode};
 use crate::ops::config::Limits;
 
-/// Marks a database as a file of studies: "toth".
+/// Marks a database as a study database: "toth".
 const APPLICATION_ID: i64 = 0x746f_7468;
 
-/// The schema of this build. Versions 1 to 4 were those of builds with workers.
+/// Schema version of this build. Versions 1 to 4 belong to builds with workers.
 const SCHEMA_VERSION: i64 = 5;
 
 /// The long columns are last, so that the others are read without them.
@@ -52,31 +52,31 @@ CREATE TABLE parts (
 ) STRICT;
 ";
 
-/// Why the file of studies did not do what it was asked.
+/// Error of the study database.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// What SQLite says, for instance that the disk is full.
-    #[error("the file of studies fails: {0}")]
+    /// An SQLite error, for example that the disk is full.
+    #[error("the study database failed: {0}")]
     Failed(rusqlite::Error),
-    /// The thread that waited for the disk ended.
-    #[error("the file of studies does not answer")]
+    /// The thread of the transaction ended.
+    #[error("the thread of the study database ended")]
     Silent,
-    /// Its content is not what was written.
-    #[error("the file of studies is damaged: {0}. Restore it from a backup, or start with a new file.")]
+    /// The content is damaged.
+    #[error("the study database is damaged: {0}. Restore it from a backup, or start with a new file.")]
     Damaged(rusqlite::Error),
-    /// Another process has it open.
-    #[error("another process has the file of studies open. A file serves one process.")]
+    /// Another process has the file open.
+    #[error("another process has the study database open. Use one file for each process.")]
     InUse,
-    /// Another version of toothwave wrote it.
+    /// Another version of toothwave wrote the file.
     #[error(
-        "the file of studies has schema {found}, and this build works with schema {SCHEMA_VERSION}. Start with a new file."
+        "the study database has schema {found}, but this build needs schema {SCHEMA_VERSION}. Start with a new file."
     )]
     OtherSchema {
-        /// The schema that it has.
+        /// The schema version of the file.
         found: i64,
     },
-    /// It is a database of another program.
-    #[error("the file is a database of something else. Name a file that does not exist yet.")]
+    /// The file is a database of another program.
+    #[error("the file is a database of another program. Name a file that does not exist yet.")]
     Foreign,
 }
 
@@ -90,18 +90,18 @@ impl From<rusqlite::Error> for StoreError {
     }
 }
 
-/// The client learns what it can do about it; the log has the words of SQLite.
+/// Converts to a problem for the client. The log gets SQLite's message.
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
-        tracing::warn!(%error, "the file of studies fails");
+        tracing::warn!(%error, "the study database failed");
         match error {
             StoreError::Damaged(_) => Self::internal(&error),
             StoreError::Failed(failed) if failed.sqlite_error_code() == Some(ErrorCode::DiskFull) => {
-                let detail = "the disk with the file of studies is full; try again when there is space";
+                let detail = "the disk of the study database is full. Retry when it has free space";
                 Self::new(ProblemCode::StoreUnavailable, detail)
             }
             _ => {
-                let detail = "the file of studies cannot be read or written now; try again in a moment";
+                let detail = "the study database cannot be read or written. Retry after 1 s";
                 Self::new(ProblemCode::StoreUnavailable, detail)
             }
         }
@@ -115,7 +115,7 @@ pub(super) struct StoredStudy {
     pub(super) state: StudyState,
     pub(super) problem: Option<Problem>,
     pub(super) progress: Progress,
-    /// Seconds since 1970, as `ends_at_s`.
+    /// Seconds since 1970, as is `ends_at_s`.
     pub(super) asked_at_s: u64,
     pub(super) ends_at_s: u64,
     max_states: u64,
@@ -125,7 +125,7 @@ pub(super) struct StoredStudy {
 }
 
 impl StoredStudy {
-    /// A study that is requested now.
+    /// Makes a new study that runs from now on.
     pub(super) fn new(study: &Study, document: &[u8], limits: &Limits) -> Self {
         let (now_s, most) = (now_s(), i64::MAX.unsigned_abs());
         Self {
@@ -165,7 +165,7 @@ impl StoredStudy {
         })
     }
 
-    /// What the stored document requests. It was within the limits of the service when the study began.
+    /// Parses the stored document. It was within the limits of the service when the study began.
     pub(super) fn read(&self) -> Result<Study, Problem> {
         if blake3::hash(&self.document) != self.document_hash {
             return Err(damaged(&self.id, "the document"));
@@ -176,7 +176,7 @@ impl StoredStudy {
     }
 }
 
-/// A part that was computed.
+/// A computed part.
 #[derive(Debug)]
 pub(super) struct NewPart {
     pub(super) study: String,
@@ -190,7 +190,7 @@ pub(super) fn now_s() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs()
 }
 
-/// An open file of studies.
+/// An open study database.
 #[derive(Debug, Clone)]
 pub struct Store {
     connection: Arc<Mutex<Connection>>,
@@ -198,11 +198,11 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens a file, which is created if it does not exist; without one, a database in memory.
+    /// Opens a file, or creates it if it does not exist. Without a file it opens a database in memory.
     pub fn open(file: Option<&Path>) -> Result<Self, StoreError> {
         let mut connection = match file {
             Some(file) => {
-                // Others on the machine may not read it. If this fails, SQLite says why.
+                // Other users must not read the file. If this fails, SQLite reports why.
                 let _ = OpenOptions::new().append(true).create(true).mode(0o600).open(file);
                 Connection::open_with_flags(file, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE)?
             }
@@ -212,18 +212,19 @@ impl Store {
         let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         require_schema(&transaction)?;
         transaction.commit()?;
-        // A commit outlives the process. After a power cut the last ones may be missing; these chunks are computed again.
+        // A commit survives the process. After a power cut the last ones may be missing; their chunks are computed
+        // again.
         connection.pragma_update_and_check(None, "journal_mode", "WAL", |_| Ok(()))?;
         connection.pragma_update(None, "synchronous", "NORMAL")?;
         Ok(Self { connection: Arc::new(Mutex::new(connection)), is_in_memory: file.is_none() })
     }
 
-    /// Whether the studies are lost at the end of the process.
+    /// True if the studies are lost at the end of the process.
     pub(super) const fn is_in_memory(&self) -> bool {
         self.is_in_memory
     }
 
-    /// Runs one short transaction on a thread that may wait for the disk. It is carried out even if nobody waits for it any more.
+    /// Runs a short transaction on a blocking thread. It completes even if the future is dropped.
     pub(super) async fn with<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Transaction<'_>) -> rusqlite::Result<T> + Send + 'static,
@@ -232,14 +233,15 @@ impl Store {
         tokio::task::spawn_blocking(move || store.now(work)).await.unwrap_or(Err(StoreError::Silent))
     }
 
-    /// Writes the write-ahead log into the file. The process may exit before the connection is dropped, which would do the same.
+    /// Writes the write-ahead log into the file. The process may exit before the connection is dropped, which would do
+    /// it too.
     pub(super) fn merge_log(&self) {
         if let Err(error) = self.connection.lock().query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())) {
-            tracing::warn!(%error, "the write-ahead log stays beside the file of studies");
+            tracing::warn!(%error, "cannot merge the write-ahead log into the study database");
         }
     }
 
-    /// Runs one short transaction on this thread.
+    /// Runs a short transaction on this thread.
     pub(super) fn now<T>(&self, work: impl FnOnce(&Transaction<'_>) -> rusqlite::Result<T>) -> Result<T, StoreError> {
         let mut connection = self.connection.lock();
         let transaction = connection.transaction()?;
@@ -262,15 +264,15 @@ fn require_schema(transaction: &Transaction<'_>) -> Result<(), StoreError> {
             Ok(())
         }
         _ => {
-            // Earlier builds noted their versions in a table.
+            // Earlier builds stored their version in a table.
             let found = transaction.query_row("SELECT MAX(version) FROM schema_versions", [], |row| row.get(0));
             Err(found.map_or(StoreError::Foreign, |found| StoreError::OtherSchema { found }))
         }
     }
 }
 
-/// All studies, the one that was requested longest ago first. Of other builds and other arithmetic, which give other bits, those that run
-/// begin again. The rest of them is removed.
+/// Loads all studies, in the order of their latest request. Another build or arithmetic gives other bits. Its running
+/// studies begin again, and its other studies and parts are removed.
 pub(super) fn load(transaction: &Transaction<'_>) -> rusqlite::Result<Vec<StoredStudy>> {
     let of_others = "DELETE FROM parts WHERE study IN (SELECT id FROM studies WHERE origin <> ?1)";
     transaction.execute(of_others, [origin()])?;
@@ -281,12 +283,12 @@ pub(super) fn load(transaction: &Transaction<'_>) -> rusqlite::Result<Vec<Stored
     statement.query_map([], StoredStudy::of_row)?.collect()
 }
 
-/// The study with this id.
+/// Returns the study with this id.
 pub(super) fn study(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result<Option<StoredStudy>> {
     transaction.query_row("SELECT * FROM studies WHERE id = ?1", [id], StoredStudy::of_row).optional()
 }
 
-/// Stores a study that runs from now on. If it has parts, it continues with them.
+/// Stores a study as running. If it has parts, it continues with them.
 pub(super) fn begin(transaction: &Transaction<'_>, study: StoredStudy) -> rusqlite::Result<StoredStudy> {
     let text = "
         INSERT INTO studies (id, origin, state, asked_at_s, ends_at_s, max_states, max_profile_points, document_hash, document)
@@ -301,7 +303,7 @@ pub(super) fn begin(transaction: &Transaction<'_>, study: StoredStudy) -> rusqli
     transaction.query_row(text, values, StoredStudy::of_row)
 }
 
-/// Stores that a study does not run any more.
+/// Stores the end of a study.
 pub(super) fn end(
     transaction: &Transaction<'_>,
     id: &str,
@@ -314,7 +316,7 @@ pub(super) fn end(
     Ok(())
 }
 
-/// Stores when a study was requested.
+/// Stores the time of a study's latest request.
 pub(super) fn set_asked_at(transaction: &Transaction<'_>, id: &str, asked_at_s: u64) -> rusqlite::Result<()> {
     transaction.execute("UPDATE studies SET asked_at_s = ?2 WHERE id = ?1", params![id, asked_at_s])?;
     Ok(())
@@ -339,15 +341,15 @@ pub(super) fn insert_part(transaction: &Transaction<'_>, part: &NewPart) -> rusq
     Ok(())
 }
 
-/// The chunks of a study that have a part.
+/// Returns the chunks of a study that have a part.
 pub(super) fn chunks_done(transaction: &Transaction<'_>, id: &str) -> rusqlite::Result<HashSet<u64>> {
     let mut statement = transaction.prepare("SELECT chunk FROM parts WHERE study = ?1")?;
     statement.query_map([id], |row| row.get(0))?.collect()
 }
 
-/// Some parts of a study, from this chunk on.
+/// Returns some parts of a study, from this chunk on.
 pub(super) fn parts(transaction: &Transaction<'_>, id: &str, from_chunk: u64) -> rusqlite::Result<Vec<(u64, Vec<u8>)>> {
-    /// Few enough that others wait for the file for some milliseconds.
+    /// Rows of one query. Others wait for the database for a few milliseconds at most.
     const AT_ONCE: i64 = 16;
     let text = "SELECT chunk, part FROM parts WHERE study = ?1 AND chunk >= ?2 ORDER BY chunk LIMIT ?3";
     let mut statement = transaction.prepare(text)?;

@@ -1,4 +1,5 @@
-//! The ellipse, described by its support function over the angle φ of its outward normal (docs/theory.md sections 2.1 to 2.3).
+//! Ellipse, described by its support function over the angle φ of its outward normal (docs/explanation/theory.md
+//! sections 2.1 to 2.3).
 
 use nalgebra::{Point2, Unit, Vector2};
 
@@ -7,14 +8,14 @@ use crate::position::Position;
 use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_in_bracket};
 use crate::violation::Parameter;
 
-/// An ellipse about the axis, `a > b`.
+/// An ellipse centred on the axis, `a > b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ellipse {
     semi_major_mm: f64,
     semi_minor_mm: f64,
 }
 
-/// The direction of a normal, the angle φ from the major axis.
+/// Direction of a normal, the angle φ from the major axis.
 #[derive(Clone, Copy)]
 struct Normal {
     cos: f64,
@@ -39,17 +40,17 @@ impl Ellipse {
         }
     }
 
-    /// `a`.
+    /// Returns `a`.
     pub const fn semi_major_mm(&self) -> f64 {
         self.semi_major_mm
     }
 
-    /// `b`.
+    /// Returns `b`.
     pub const fn semi_minor_mm(&self) -> f64 {
         self.semi_minor_mm
     }
 
-    /// `a² - b²`, as a product so that a nearly round cam keeps all its digits.
+    /// Returns `a² - b²`, as a product so that a nearly round cam keeps all its digits.
     pub(crate) fn difference_of_squares_mm2(&self) -> f64 {
         (self.semi_major_mm - self.semi_minor_mm) * (self.semi_major_mm + self.semi_minor_mm)
     }
@@ -58,14 +59,14 @@ impl Ellipse {
         (self.semi_major_mm * normal.cos).hypot(self.semi_minor_mm * normal.sin)
     }
 
-    /// Radius of curvature `ρ_H = h + h'' = a²b²/h³`: for an ellipse the sum has this closed form without cancellation.
+    /// Returns the radius of curvature `ρ_H = h + h'' = a²b²/h³`, a closed form without cancellation.
     fn curvature_radius_mm(&self, support_mm: f64) -> f64 {
         let a_over_h = self.semi_major_mm / support_mm;
         let b_over_h = self.semi_minor_mm / support_mm;
         a_over_h * a_over_h * b_over_h * b_over_h * support_mm
     }
 
-    /// `h'' = ρ_H - h`, written as a product of differences that keeps its digits for a nearly round cam:
+    /// Returns `h'' = ρ_H - h`, as a product of differences that keeps its digits for a nearly round cam:
     /// `(a - b)(b sin²φ - a cos²φ)(ab + h²)/h³`.
     fn support_second_derivative_mm(&self, normal: Normal, support_mm: f64) -> f64 {
         let (a, b, h) = (self.semi_major_mm, self.semi_minor_mm, support_mm);
@@ -73,7 +74,8 @@ impl Ellipse {
         (a - b) * ((b * s * s - a * c * c) / h) * ((a / h) * (b / h) + 1.0)
     }
 
-    /// The normal at the tooth: `tan φ = tan ψ (a² + rh)/(b² + rh)`, sums and products of positive terms alone.
+    /// Returns the normal at the tooth: `tan φ = tan ψ (a² + rh)/(b² + rh)`, with sums and products of positive terms
+    /// only.
     fn normal(&self, tooth_radius_mm: f64, position: Position, support_mm: f64) -> Normal {
         let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
         let cos = position.phase_cos * (b * b + r * support_mm);
@@ -105,8 +107,8 @@ impl Kind for Ellipse {
         2
     }
 
-    /// The centre is `((a²/h + r) cos φ, (b²/h + r) sin φ)`, so that φ follows from ψ once the support `h = h(φ)` is known. `h` is the one
-    /// root in `[b, a]` of `sin²ψ (a² + rh)² (h² - b²) - cos²ψ (b² + rh)² (a² - h²)`.
+    /// The centre is `((a²/h + r) cos φ, (b²/h + r) sin φ)`, so φ follows from ψ and the support `h = h(φ)`. `h` is the
+    /// one root in `[b, a]` of `sin²ψ (a² + rh)² (h² - b²) - cos²ψ (b² + rh)² (a² - h²)`.
     fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged> {
         let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
         let Position { phase_cos: cos, phase_sin: sin, .. } = position;
@@ -123,7 +125,7 @@ impl Kind for Ellipse {
         Ok(self.center(r, position, self.normal(r, position, support_mm)))
     }
 
-    /// There `h''(h + r) = h'²`; in `u = cos²φ` and divided by `a - b` this reads
+    /// At the steepest point `h''(h + r) = h'²`. In terms of `u = cos²φ` and divided by `a - b` this is
     /// `(b - (a + b) u)(ab + h²)(h + r) = h (a + b)(a² - b²) u (1 - u)`, with `h² = b² + (a² - b²) u`.
     fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged> {
         let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
@@ -159,7 +161,7 @@ impl Kind for Ellipse {
         self.semi_minor_mm * (self.semi_minor_mm / self.semi_major_mm)
     }
 
-    /// With `h² - b² = (a² - b²) cos²φ` and `h'² = (h² - b²)(a² - h²)/h²`.
+    /// Uses `h² - b² = (a² - b²) cos²φ` and `h'² = (h² - b²)(a² - h²)/h²`.
     fn center_rise_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
         let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
         let h = tooth.cam_contact.support_mm;
@@ -168,7 +170,7 @@ impl Kind for Ellipse {
         self.difference_of_squares_mm2() * cos_squared * (2.0 * r / (h + b) + (a / h) * (a / h))
     }
 
-    /// With `a² - h² = (a² - b²) sin²φ`.
+    /// Uses `a² - h² = (a² - b²) sin²φ`.
     fn center_drop_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
         let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
         let h = tooth.cam_contact.support_mm;
@@ -188,7 +190,7 @@ impl Kind for Ellipse {
         None
     }
 
-    /// The lower root of `2b r² + (b² + 2a² - k²(a² - b²)) r + a²b = 0`; none where the roots are not real.
+    /// The lower root of `2b r² + (b² + 2a² - k²(a² - b²)) r + a²b = 0`; none if the roots are complex.
     fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64> {
         let (a, b, k) = (self.semi_major_mm, self.semi_minor_mm, ring_teeth_per_lobe);
         let linear = k * k * self.difference_of_squares_mm2() - b * b - 2.0 * a * a;
@@ -196,7 +198,7 @@ impl Kind for Ellipse {
         if linear < least {
             return None;
         }
-        // The stable form of the lower root: no difference of near values.
+        // The stable form of the lower root: no difference of nearly equal values.
         let root = ((linear - least) * (linear + least)).sqrt();
         Some(2.0 * a * (a * b / (linear + root)))
     }
@@ -208,7 +210,7 @@ impl Kind for Ellipse {
         (a * (a * normal.cos)).atan2(b * (b * normal.sin))
     }
 
-    /// By the angle φ of the normal, for which no tooth has to be found.
+    /// Takes the place as the angle φ of the normal, so that no tooth position has to be found.
     fn outline(&self, _: f64, set_back_mm: f64, place: Position) -> Result<CamPoint, NotConverged> {
         let (a, b) = (self.semi_major_mm, self.semi_minor_mm);
         let normal = Normal { cos: place.phase_cos, sin: place.phase_sin };

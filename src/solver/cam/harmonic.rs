@@ -1,5 +1,5 @@
-//! The support function `h = R0 + e cos Uφ`; with one lobe exactly the circle of radius R0 about a point e beside the axis
-//! (docs/theory.md section 2.9).
+//! Support function `h = R0 + e cos Uφ`. With one lobe it is exactly the circle of radius R0 about a point at the
+//! distance e from the axis (docs/explanation/theory.md section 2.9).
 
 use crate::cam::kind::{CamContact, Given, Hollow, Kind, ToothCenter};
 use crate::position::{Position, half_lobe_rad};
@@ -14,7 +14,7 @@ pub struct Harmonic {
     amplitude_mm: f64,
 }
 
-/// Half the phase `Uφ` of a normal, a quarter turn from lobe to valley.
+/// Half the phase `Uφ` of a normal: a quarter turn from lobe to valley.
 #[derive(Clone, Copy)]
 struct NormalPhase {
     cos: f64,
@@ -39,25 +39,25 @@ impl Harmonic {
         }
     }
 
-    /// The circle off the axis, as such.
+    /// Returns the parameters of the eccentric circle.
     pub(super) const fn eccentric(radius_mm: f64, eccentricity_mm: f64) -> Given {
         let stroke = (Parameter::Eccentricity, eccentricity_mm);
         let size = (Parameter::EccentricRadius, radius_mm);
         Given { are_lobes_given: false, size, shape: stroke, stroke, ..Self::given(1, radius_mm, eccentricity_mm) }
     }
 
-    /// What R0 has to exceed: e, for the axis to be inside, and `e(U² - 1)`, for the lobe to be round.
+    /// Returns the lower bound of R0: e, so that the axis is inside, and `e(U² - 1)`, so that the lobe is round.
     pub(super) fn least_mean_radius_mm(lobes: u32, amplitude_mm: f64) -> f64 {
         amplitude_mm * Self::bluntness(lobes).max(1.0)
     }
 
-    /// `U² - 1`.
+    /// Returns `U² - 1`.
     fn bluntness(lobes: u32) -> f64 {
         let u = f64::from(lobes);
         (u - 1.0) * (u + 1.0)
     }
 
-    /// Whether it is the circle off the axis.
+    /// Returns true if the cam is the eccentric circle.
     pub(crate) const fn is_circle(&self) -> bool {
         self.lobes == 1
     }
@@ -66,12 +66,12 @@ impl Harmonic {
         self.lobes
     }
 
-    /// `R0`.
+    /// Returns `R0`.
     pub(crate) const fn mean_radius_mm(&self) -> f64 {
         self.mean_radius_mm
     }
 
-    /// `e`.
+    /// Returns `e`.
     pub(crate) const fn amplitude_mm(&self) -> f64 {
         self.amplitude_mm
     }
@@ -80,7 +80,7 @@ impl Harmonic {
         f64::from(self.lobes)
     }
 
-    /// `P0 = R0 + r`.
+    /// Returns `P0 = R0 + r`.
     fn mean_path_mm(&self, tooth_radius_mm: f64) -> f64 {
         self.mean_radius_mm + tooth_radius_mm
     }
@@ -90,7 +90,7 @@ impl Harmonic {
         let (cos_squared, sin_squared) = (phase.cos * phase.cos, phase.sin * phase.sin);
         let cos = cos_squared - sin_squared;
         let support_mm = self.mean_radius_mm + e * cos;
-        // R0 - e(U² - 1) cos Uφ, the difference first that is small at a sharp lobe.
+        // R0 - e(U² - 1) cos Uφ, starting with the difference that is small at a sharp lobe.
         let at_lobe_mm = self.mean_radius_mm - e * Self::bluntness(self.lobes);
         let curvature_radius_mm = at_lobe_mm + 2.0 * e * Self::bluntness(self.lobes) * sin_squared;
         let cam_contact = CamContact {
@@ -101,7 +101,8 @@ impl Harmonic {
         ToothCenter::by_support(position, tooth_radius_mm, cam_contact, curvature_radius_mm, -e * u * u * cos)
     }
 
-    /// `1 - cos Uφ` and `1 + cos Uφ`, each to full relative precision: from `sin Uφ`, which the lever arm is made of, where that is small.
+    /// Returns `1 - cos Uφ` and `1 + cos Uφ`, each to full relative precision. The small one follows from `sin Uφ`,
+    /// which is in the lever arm.
     fn versed(&self, tooth: &ToothCenter) -> (f64, f64) {
         let sin = tooth.cam_contact.lever_arm_mm / (self.amplitude_mm * self.lobe_count());
         let cos = (self.lobe_count() * tooth.normal_rad()).cos();
@@ -113,7 +114,7 @@ impl Harmonic {
         if cos > 0.0 { (small, 2.0 - small) } else { (2.0 - small, small) }
     }
 
-    /// `γ` and `dγ/dφ` where the normal is `angle_rad` off a lobe (`towards` = 1) or a valley (-1):
+    /// Returns `γ` and `dγ/dφ` for a normal at `angle_rad` from a lobe (`towards` = 1) or a valley (-1):
     /// `tan γ = eU sin/(P0 ± e cos)`.
     fn pressure_angle(&self, tooth_radius_mm: f64, angle_rad: f64, towards: f64) -> ValueAndSlope {
         let (u, e) = (self.lobe_count(), self.amplitude_mm);
@@ -127,7 +128,8 @@ impl Harmonic {
         }
     }
 
-    /// The angle of the normal from the lobe, `φ - γ = ψ`, or, beyond the middle, its angle y from the valley, `y + γ = x`.
+    /// Solves for the normal's angle from the lobe, `φ - γ = ψ`, or, in the outer half, its angle y from the valley,
+    /// `y + γ = x`.
     fn normal_phase(&self, tooth_radius_mm: f64, position: Position) -> Result<NormalPhase, NotConverged> {
         const WHAT: &str = "normal of the cam at a tooth";
         if position.phase_sin == 0.0 || position.phase_cos == 0.0 {
@@ -153,7 +155,7 @@ impl Harmonic {
             Ok(NormalPhase { cos, sin })
         } else {
             let x = position.from_valley_rad;
-            // γ is at most eU² times y over what it is least above.
+            // γ is at most eU² y over the least value of the denominator.
             let e = self.amplitude_mm;
             let low = x / (1.0 + e * u * u / (self.mean_path_mm(tooth_radius_mm) - e));
             let normal_rad = newton_in_bracket(WHAT, low.min(x), x, low, |y| {
@@ -175,7 +177,7 @@ impl Kind for Harmonic {
         Ok(self.center(tooth_radius_mm, position, self.normal_phase(tooth_radius_mm, position)?))
     }
 
-    /// `cos Uφ = -e/P0`.
+    /// At `cos Uφ = -e/P0`.
     fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged> {
         let share = self.amplitude_mm / self.mean_path_mm(tooth_radius_mm);
         let phase = NormalPhase { cos: (0.5 * (1.0 - share)).sqrt(), sin: (0.5 * (1.0 + share)).sqrt() };
@@ -226,7 +228,8 @@ impl Kind for Harmonic {
         None
     }
 
-    /// The lower root of `2r² + (A + 2B - eZ_K²) r + AB = 0`, `A = R0 - e`, `B = R0 + e(U² - 1)`; none where the roots are not real.
+    /// The lower root of `2r² + (A + 2B - eZ_K²) r + AB = 0`, `A = R0 - e`, `B = R0 + e(U² - 1)`; none if the roots
+    /// are complex.
     fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64> {
         let ring_teeth = ring_teeth_per_lobe * self.lobe_count();
         let a = self.mean_radius_mm - self.amplitude_mm;

@@ -1,5 +1,5 @@
-//! The cam that moves the centres along `d = R + e cos Uψ`: explicit in the position, and hollow in its valleys where the stroke is large
-//! (docs/theory.md section 2.9).
+//! Cam that moves the tooth centres along `d = R + e cos Uψ`. It is explicit in the position, and concave in its
+//! valleys for large strokes (docs/explanation/theory.md section 2.9).
 
 use std::f64::consts::PI;
 
@@ -8,7 +8,7 @@ use crate::position::Position;
 use crate::root::{NotConverged, bracketed};
 use crate::violation::Parameter;
 
-/// A cam with a harmonic path of the centres.
+/// A cam with a harmonic path of the tooth centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HarmonicPath {
     lobes: u32,
@@ -34,9 +34,10 @@ impl HarmonicPath {
         }
     }
 
-    /// What R has to exceed: `r + e`, for the valley to lie outside the axis; and with two lobes or more the larger root of
-    /// `r(R + e + eU²) = (R + e)²`, for the lobe to be round. With one lobe `r < √(R² - e²)` at its sharpest place follows from the first. With
-    /// three or more the flanks of a lobe may meet all the same, where `R < 2e`.
+    /// Returns the lower bound of R. It exceeds `r + e`, so that the valley is outside the axis. With two lobes or more
+    /// it exceeds the larger root of `r(R + e + eU²) = (R + e)²`, so that the lobe is round. With one lobe
+    /// `r < √(R² - e²)` at the sharpest point follows from the first. With three lobes or more the flanks of a lobe may
+    /// still meet if `R < 2e`.
     pub(super) fn least_mean_radius_mm(
         lobes: u32,
         mean_radius_mm: f64,
@@ -62,13 +63,14 @@ impl HarmonicPath {
             return round_mm;
         }
         let between_flanks_mm = |mean_radius_mm| Ok(between_flanks_mm(mean_radius_mm));
-        // From there on they never meet.
+        // Above this radius they never meet.
         bracketed("least radius of the path", from_mm, at_start_mm, to_mm, between_flanks_mm).unwrap_or(to_mm)
     }
 
-    /// The least of the path's normals `d sin ψ/sin(ψ + γ)` from a centre to its lobe's axis: so thick a tooth meets the other flank's there.
+    /// Returns the least normal `d sin ψ/sin(ψ + γ)` of the path from a centre to its lobe's axis. A tooth of that
+    /// radius meets the other flank there.
     fn least_normal_mm(&self) -> f64 {
-        /// Of the phase from the valley; the least normal of a drive of `MAX_LOBES` stands within.
+        /// Least phase from the valley, in rad: the least normal of a drive of `MAX_LOBES` is within the range.
         const FINEST_RAD: f64 = 1e-5;
         const RATIO: f64 = 0.8;
         let normal_mm = |valley_rad: f64| {
@@ -88,7 +90,7 @@ impl HarmonicPath {
                 (least_mm, at_rad) = (found_mm, rad);
             }
         }
-        // Golden section between its neighbours.
+        // Golden-section search between its neighbours.
         const SHARE: f64 = 0.618_033_988_749_894_8;
         let (mut low, mut high) = (at_rad * RATIO, (at_rad / RATIO).min(PI));
         for _ in 0..40 {
@@ -100,18 +102,18 @@ impl HarmonicPath {
         least_mm
     }
 
-    /// `e`.
+    /// Returns `e`.
     pub const fn amplitude_mm(&self) -> f64 {
         self.amplitude_mm
     }
 
-    /// `R/(U² + 1)`: beyond it the cam is hollow in its valleys.
+    /// Returns `R/(U² + 1)`, the amplitude above which the cam is concave in its valleys.
     fn greatest_convex_amplitude_mm(&self) -> f64 {
         let u = self.lobe_count();
         self.mean_radius_mm / (u * u + 1.0)
     }
 
-    /// `R`.
+    /// Returns `R`.
     pub(crate) const fn mean_radius_mm(&self) -> f64 {
         self.mean_radius_mm
     }
@@ -120,12 +122,12 @@ impl HarmonicPath {
         f64::from(self.lobes)
     }
 
-    /// `d_v = R - e`.
+    /// Returns `d_v = R - e`.
     fn valley_mm(&self) -> f64 {
         self.mean_radius_mm - self.amplitude_mm
     }
 
-    /// `cos Uψ`.
+    /// Returns `cos Uψ`.
     fn cos_of_lobe(position: &Position) -> f64 {
         let (cos, sin) = (position.phase_cos, position.phase_sin);
         cos * cos - sin * sin
@@ -138,7 +140,7 @@ impl Kind for HarmonicPath {
     }
 
     /// `T = eU sin(Uψ)/d`, `T_ψ = eU² cos(Uψ)/d + T²`, the path's curvature `κ_C = (cos γ/d)(1 + T_ψ/(1 + T²))`, and
-    /// `1/ρ_H = κ_C/(1 - rκ_C)`, which has no pole where the cam is straight.
+    /// `1/ρ_H = κ_C/(1 - rκ_C)`, which has no pole at a straight part of the cam.
     fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged> {
         let (u, e) = (self.lobe_count(), self.amplitude_mm);
         let (cos, sin) = (position.phase_cos, position.phase_sin);
@@ -166,7 +168,7 @@ impl Kind for HarmonicPath {
         Ok(self.mean_radius_mm + self.amplitude_mm * Self::cos_of_lobe(&position))
     }
 
-    /// `cos Uψ = -e/R`.
+    /// At `cos Uψ = -e/R`.
     fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged> {
         let share = self.amplitude_mm / self.mean_radius_mm;
         let (cos, sin) = ((0.5 * (1.0 - share)).sqrt(), (0.5 * (1.0 + share)).sqrt());
@@ -188,7 +190,7 @@ impl Kind for HarmonicPath {
         self.valley_mm() - tooth_radius_mm
     }
 
-    /// In the middle of a lobe; with one lobe where `cos ψ = -e/R`, the path's radius of curvature being `√(R² - e²)` there.
+    /// In the middle of a lobe; with one lobe at `cos ψ = -e/R`, where the path's radius of curvature is `√(R² - e²)`.
     fn least_curvature_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
         let (e, u) = (self.amplitude_mm, self.lobe_count());
         let lobe_mm = self.mean_radius_mm + e;
@@ -200,13 +202,13 @@ impl Kind for HarmonicPath {
         path_mm - tooth_radius_mm
     }
 
-    /// With `d - d_v = e(1 + cos Uψ)`.
+    /// Uses `d - d_v = e(1 + cos Uψ)`.
     fn center_rise_mm2(&self, _: f64, tooth: &ToothCenter) -> f64 {
         let cos = tooth.position.phase_cos;
         2.0 * self.amplitude_mm * cos * cos * (tooth.center_radius_mm + self.valley_mm())
     }
 
-    /// With `d_l - d = e(1 - cos Uψ)`.
+    /// Uses `d_l - d = e(1 - cos Uψ)`.
     fn center_drop_mm2(&self, _: f64, tooth: &ToothCenter) -> f64 {
         let sin = tooth.position.phase_sin;
         2.0 * self.amplitude_mm * sin * sin * (tooth.center_radius_mm + (self.mean_radius_mm + self.amplitude_mm))
@@ -223,7 +225,7 @@ impl Kind for HarmonicPath {
         (self.amplitude_mm > limit_mm).then_some(Hollow { amplitude_mm: self.amplitude_mm, limit_mm })
     }
 
-    /// `(R - e)²/(eZ_K² - (R - e))`, the path held as it is.
+    /// `(R - e)²/(eZ_K² - (R - e))`, with the path unchanged.
     fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64> {
         let ring_teeth = ring_teeth_per_lobe * self.lobe_count();
         let valley_mm = self.valley_mm();
@@ -231,7 +233,7 @@ impl Kind for HarmonicPath {
         (bend_mm > 0.0).then(|| valley_mm * (valley_mm / bend_mm))
     }
 
-    /// The path stays as it is where teeth get thicker.
+    /// The path does not depend on the tooth radius.
     fn surely_free_radius_mm(&self, sin: f64) -> f64 {
         self.valley_mm() * sin
     }

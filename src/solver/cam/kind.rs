@@ -1,4 +1,5 @@
-//! What a kind of wave generator is: where it holds a tooth, and what it answers about itself (docs/theory.md section 2).
+//! Interface of a kind of wave generator: the position of a tooth and the geometry of the cam
+//! (docs/explanation/theory.md section 2).
 
 use nalgebra::{Point2, Unit, Vector2};
 
@@ -6,49 +7,49 @@ use crate::position::Position;
 use crate::root::NotConverged;
 use crate::violation::Parameter;
 
-/// What a designer gives for a wave generator, as each kind tells it in its own file.
+/// Parameters of a wave generator, as each kind defines them in its own file.
 pub(super) struct Given {
     pub(super) lobes: i64,
-    /// Whether the lobes are given, or those that the kind has.
+    /// True if the designer gives the number of lobes, false if the kind fixes it.
     pub(super) are_lobes_given: bool,
-    /// What says how large the cam is.
+    /// Parameter that sets the size of the cam.
     pub(super) size: (Parameter, f64),
-    /// What says how far it is from round.
+    /// Parameter that sets the deviation from a circle.
     pub(super) shape: (Parameter, f64),
-    /// What says how far the teeth are moved.
+    /// Parameter that sets the stroke of the teeth.
     pub(super) stroke: (Parameter, f64),
-    /// Of the cam, or of the path of the teeth's centres.
+    /// Mean radius of the cam, or of the path of the tooth centres.
     pub(super) mean_radius_mm: f64,
     pub(super) is_path: bool,
 }
 
-/// The cam where a tooth touches it.
+/// Contact of the cam with a tooth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CamContact {
     /// Support function `h(φ)`: distance of the tangent from the axis.
     pub support_mm: f64,
-    /// `|h'(φ)|`: the lever arm of a force along the normal about the axis.
+    /// `|h'(φ)|`: lever arm, about the axis, of a force along the normal.
     pub lever_arm_mm: f64,
-    /// `1/ρ_H`: negative where the cam is hollow.
+    /// `1/ρ_H`; negative where the cam is concave.
     pub curvature_per_mm: f64,
 }
 
-/// A point of the cam's outline, in its own frame.
+/// Point of the cam's outline, in its own frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CamPoint {
     pub(crate) point: Point2<f64>,
-    /// Counter-clockwise.
+    /// Tangent, counter-clockwise.
     pub(crate) tangent: Unit<Vector2<f64>>,
-    /// Negative where the cam is hollow.
+    /// Curvature up to a positive factor; negative where the cam is concave.
     pub(crate) bend: f64,
 }
 
-/// A tooth at one position. Mesh, ring and load follow from `d`, `T` and `T_ψ` alone.
+/// A tooth at one position. Mesh, ring and load follow from `d`, `T` and `T_ψ` only.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToothCenter {
-    /// Where it is.
+    /// Position of the tooth.
     pub position: Position,
-    /// Where it touches the cam.
+    /// Contact with the cam.
     pub cam_contact: CamContact,
     /// `d`: distance of its centre from the axis.
     pub center_radius_mm: f64,
@@ -59,7 +60,8 @@ pub struct ToothCenter {
 }
 
 impl ToothCenter {
-    /// On a cam that is known by its support function: `d² = (h + r)² + h'²`, `T_ψ = (1 + T²)(T |h'| - h'')/(r + ρ_H)`.
+    /// Builds the tooth on a cam with a support function: `d² = (h + r)² + h'²`,
+    /// `T_ψ = (1 + T²)(T |h'| - h'')/(r + ρ_H)`.
     pub(crate) fn by_support(
         position: Position,
         tooth_radius_mm: f64,
@@ -80,86 +82,86 @@ impl ToothCenter {
         }
     }
 
-    /// cos γ.
+    /// Returns cos γ.
     pub fn cos_pressure_angle(&self) -> f64 {
         let t = self.tan_pressure_angle;
         1.0 / (1.0 + t * t).sqrt()
     }
 
-    /// `φ = ψ + γ`: angle of the contact normal at the cam, from the lobe.
+    /// Returns `φ = ψ + γ`: angle of the contact normal at the cam, from the lobe.
     pub fn normal_rad(&self) -> f64 {
         self.position.from_lobe_rad + self.tan_pressure_angle.atan()
     }
 }
 
-/// Valleys that are hollow.
+/// Concave valleys.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Hollow {
-    /// The cam's amplitude.
+    /// Amplitude of the cam.
     pub(crate) amplitude_mm: f64,
-    /// The amplitude up to which it would be convex.
+    /// Largest amplitude of a convex cam.
     pub(crate) limit_mm: f64,
 }
 
-/// What a kind of wave generator answers, for teeth of the radius `r`.
+/// Geometry of a kind of wave generator, for teeth of the radius `r`.
 ///
-/// Mesh and load follow from [`Kind::tooth`] alone. The rest are closed forms: of lengths, because differences of them decide what fits,
-/// and of what happens in the valley, where a flank may be irregular by less than rounding.
+/// Mesh and load follow from [`Kind::tooth`] only. The other methods are closed forms. They give lengths whose
+/// differences decide what fits, and properties of the valley, where a flank may be irregular by less than rounding.
 pub(crate) trait Kind {
-    /// `U`.
+    /// Returns `U`.
     fn lobes(&self) -> u32;
 
-    /// The tooth whose centre stands at `position`.
+    /// Returns the tooth whose centre is at `position`.
     fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged>;
 
-    /// `d` alone.
+    /// Returns `d` only.
     fn center_radius_mm(&self, tooth_radius_mm: f64, position: Position) -> Result<f64, NotConverged> {
         Ok(self.tooth(tooth_radius_mm, position)?.center_radius_mm)
     }
 
-    /// The tooth with the largest pressure angle, where `dT/dψ = 0`.
+    /// Returns the tooth with the largest pressure angle, where `dT/dψ = 0`.
     fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged>;
 
-    /// The cam's largest distance from the axis, in the middle of a lobe: `d_l - r`.
+    /// Returns the cam's largest distance from the axis, in the middle of a lobe: `d_l - r`.
     fn outer_radius_mm(&self, tooth_radius_mm: f64) -> f64;
 
-    /// The cam's least distance from the axis, in a valley: `d_v - r`.
+    /// Returns the cam's least distance from the axis, in a valley: `d_v - r`.
     fn inner_radius_mm(&self, tooth_radius_mm: f64) -> f64;
 
-    /// The least radius of curvature of the cam where it is convex.
+    /// Returns the least radius of curvature of the cam in its convex part.
     fn least_curvature_radius_mm(&self, tooth_radius_mm: f64) -> f64;
 
-    /// `d² - d_v²`, free of cancellation towards the valley.
+    /// Returns `d² - d_v²`, free of cancellation towards the valley.
     fn center_rise_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64;
 
-    /// `d_l² - d²`, free of cancellation towards the lobe.
+    /// Returns `d_l² - d²`, free of cancellation towards the lobe.
     fn center_drop_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64;
 
-    /// `-k² T_ψ` in the valley, which is what bends the ring's tip: `d_v κ = 1 - this`.
+    /// Returns `-k² T_ψ` in the valley, which sets the curvature of the ring's tip: `d_v κ = 1 - this`.
     fn tip_bend(&self, tooth_radius_mm: f64, ring_teeth_per_lobe: f64) -> f64;
 
-    /// The least tooth radius that undercuts the ring; none where no radius does.
+    /// Returns the least tooth radius that undercuts the ring; none if no radius does.
     fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64>;
 
-    /// Whether its valleys are hollow. A kind that never is says so: there is no default that a new kind could forget.
+    /// Returns the concave valleys, if any. There is no default, so that every new kind has to answer.
     fn hollow(&self) -> Option<Hollow>;
 
-    /// The radius up to which neighbouring teeth are apart for sure, `sin` being that of half the angle between them: no centre comes
-    /// nearer to the axis than `d_v`, and `d_v sin > r` is enough.
+    /// Returns a tooth radius below which neighbouring teeth cannot touch, with `sin` of half the angle between them.
+    /// No centre is closer to the axis than `d_v`, and `d_v sin > r` is sufficient.
     fn surely_free_radius_mm(&self, sin: f64) -> f64 {
-        // The cam stays as it is where teeth get thicker, so that d_v grows with r.
+        // The cam does not depend on the tooth radius, so d_v grows with r.
         self.inner_radius_mm(0.0) * (sin / (1.0 - sin))
     }
 
-    /// Angle φ_H of the contact point from the valley, about the axis of rotation.
+    /// Returns the angle φ_H of the contact point from the valley, about the axis of rotation.
     fn contact_angle_from_valley_rad(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
         let normal_mm = tooth_radius_mm * tooth.cos_pressure_angle();
         let behind_rad = (normal_mm * tooth.tan_pressure_angle).atan2(tooth.center_radius_mm - normal_mm);
         tooth.position.from_valley_rad + behind_rad
     }
 
-    /// The outline where the tooth at `place` touches it, set back along its normal. A kind that knows its outline by the normal's
-    /// angle may take `place` as that.
+    /// Returns the point of the outline where the tooth at `place` touches it, offset inward along its normal. A kind
+    /// whose outline is known by the normal's angle may take `place` as that angle.
     fn outline(&self, tooth_radius_mm: f64, set_back_mm: f64, place: Position) -> Result<CamPoint, NotConverged> {
         let tooth = self.tooth(tooth_radius_mm, place)?;
         let (sin, cos) = tooth.normal_rad().sin_cos();
@@ -169,7 +171,7 @@ pub(crate) trait Kind {
         Ok(CamPoint {
             point: Point2::from(center - inside_mm * Vector2::new(cos, sin)),
             tangent: Unit::new_unchecked(Vector2::new(-sin, cos)),
-            // As that of the cam itself, as far as its parallel curves are regular.
+            // Sign as for the cam itself, as long as its parallel curves are regular.
             bend: tooth.cam_contact.curvature_per_mm,
         })
     }

@@ -1,7 +1,8 @@
-//! Wave generators, one file a kind (docs/theory.md section 2).
+//! Wave generators, one file for each kind (docs/explanation/theory.md section 2).
 //!
-//! A further kind is a file that implements `Kind` (`kind.rs`) and says what is given for it, a line of [`Cam`] with its arm in `Cam::kind`, and
-//! a line of [`WaveGenerator`] with its arms in `WaveGenerator::given` and `WaveGenerator::cam`.
+//! To add a kind, add a file that implements `Kind` (`kind.rs`) and returns its parameters. Then add a variant of
+//! [`Cam`] with its arm in `Cam::kind`, and a variant of [`WaveGenerator`] with its arms in `WaveGenerator::given` and
+//! `WaveGenerator::cam`.
 
 mod ellipse;
 mod harmonic;
@@ -17,56 +18,56 @@ pub use kind::{CamContact, ToothCenter};
 pub(crate) use kind::{CamPoint, Hollow};
 use kind::{Given, Kind};
 
-/// What describes a wave generator, not yet checked.
+/// Parameters of a wave generator, not yet checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WaveGenerator {
     /// An ellipse: two lobes.
     Ellipse {
-        /// `a`.
+        /// `a`: semi-major axis, in mm.
         semi_major_mm: f64,
-        /// `b`.
+        /// `b`: semi-minor axis, in mm.
         semi_minor_mm: f64,
     },
-    /// A circle that turns about a point beside its centre: one lobe.
+    /// A circle that rotates about a point off its centre: one lobe.
     Eccentric {
-        /// `R0`: the circle's radius.
+        /// `R0`: radius of the circle, in mm.
         radius_mm: f64,
-        /// `e`: distance of its centre from the axis.
+        /// `e`: distance of its centre from the axis, in mm.
         eccentricity_mm: f64,
     },
     /// The support function `R0 + e cos Uφ`.
     Harmonic {
-        /// `U`.
+        /// `U`: number of lobes.
         lobes: i64,
-        /// `R0`.
+        /// `R0`: mean radius of the cam, in mm.
         mean_radius_mm: f64,
-        /// `e`.
+        /// `e`: amplitude, in mm.
         amplitude_mm: f64,
     },
-    /// The cam that moves the teeth's centres along `R + e cos Uψ`.
+    /// The cam that moves the tooth centres along `R + e cos Uψ`.
     HarmonicPath {
-        /// `U`.
+        /// `U`: number of lobes.
         lobes: i64,
-        /// `R`.
+        /// `R`: mean radius of the path, in mm.
         mean_path_radius_mm: f64,
-        /// `e`.
+        /// `e`: amplitude, in mm.
         amplitude_mm: f64,
     },
 }
 
-/// A wave generator that exists.
+/// A wave generator with checked parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cam {
     /// An ellipse.
     Ellipse(Ellipse),
     /// A harmonic support function; with one lobe an eccentric circle.
     Harmonic(Harmonic),
-    /// A harmonic path of the centres.
+    /// A harmonic path of the tooth centres.
     HarmonicPath(HarmonicPath),
 }
 
 impl Cam {
-    /// What it is made of.
+    /// Returns its geometry.
     pub(crate) const fn kind(&self) -> &dyn Kind {
         match self {
             Self::Ellipse(cam) => cam,
@@ -90,48 +91,50 @@ impl WaveGenerator {
         }
     }
 
-    /// `U`, as given.
+    /// Returns `U`, as given.
     pub const fn lobes(&self) -> i64 {
         self.given().lobes
     }
 
-    /// What is given, each with the range that it has to lie in.
+    /// Returns the given values, each with the parameter that defines its range.
     pub fn parameters(&self) -> Vec<(Parameter, f64)> {
         let Given { lobes, are_lobes_given, size, shape, .. } = self.given();
         are_lobes_given.then_some((Parameter::Lobes, lobes as f64)).into_iter().chain([size, shape]).collect()
     }
 
-    /// What says how large the cam is, and how far it is from round.
+    /// Returns the parameters that set the size of the cam and its deviation from a circle.
     pub const fn size_and_shape(&self) -> [Parameter; 2] {
         let Given { size, shape, .. } = self.given();
         [size.0, shape.0]
     }
 
-    /// Whether the cam is another one under teeth of another radius, because it is their path that is given.
+    /// Returns true if the cam depends on the tooth radius, because the path of the teeth is given.
     pub(crate) const fn follows_from_teeth(&self) -> bool {
         self.given().is_path
     }
 
-    /// `R_race`: speed of a race along the cam over its turning (docs/theory.md section 10.2).
+    /// Returns `R_race`: speed of a race along the cam over its angular velocity (docs/explanation/theory.md section
+    /// 10.2).
     pub fn race_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
         let Given { mean_radius_mm, is_path, .. } = self.given();
         if is_path { mean_radius_mm - tooth_radius_mm } else { mean_radius_mm }
     }
 
-    /// Whether the cam is a circle off the axis: an eccentric, or a harmonic support with one lobe.
+    /// Returns true if the cam is an eccentric circle: an eccentric, or a harmonic support with one lobe.
     pub const fn is_eccentric_circle(&self) -> bool {
         matches!(self, Self::Eccentric { .. } | Self::Harmonic { lobes: 1, .. })
     }
 
-    /// What says how far the teeth are moved: of an ellipse, whose other axis is held, the semi-major axis.
+    /// Returns the parameter that sets the stroke of the teeth. For an ellipse it is the semi-major axis, the other
+    /// being fixed.
     pub(crate) const fn stroke(&self) -> (Parameter, f64) {
         self.given().stroke
     }
 
-    /// The cam under teeth of this radius, every parameter being in its range.
+    /// Returns the cam for teeth of this radius. Every parameter must be in its range.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason why there is no such cam.
     pub(crate) fn cam(&self, tooth_radius_mm: f64) -> Result<Cam, Violation> {
         // In range, so at most MAX_LOBES.
         let lobes = u32::try_from(self.lobes()).unwrap_or(u32::MAX);

@@ -1,4 +1,4 @@
-//! The load on the wave generator's bearing and how long it lasts (docs/theory.md sections 4.9 and 10.5).
+//! The load on the wave generator's bearing and how long it lasts (docs/explanation/theory.md sections 4.9 and 10.5).
 
 use std::f64::consts::PI;
 
@@ -54,7 +54,7 @@ impl RollingElement {
 
 impl Mechanism {
     /// What the teeth's normal forces come to on the wave generator, in its frame, x along the middle of lobe 0: `-Σ F_H n(φ + 2πu/U)`
-    /// over all teeth, which are those that the mesh lists (docs/theory.md section 4.9). Nothing where two lobes or more are loaded alike.
+    /// over all teeth, which are those that the mesh lists (docs/explanation/theory.md section 4.9). Nothing where two lobes or more are loaded alike.
     pub fn radial_force_n(&self, teeth: &[LoadedTooth]) -> Vector2<f64> {
         if self.lobes_loaded_alike() > 1 {
             return Vector2::zeros();

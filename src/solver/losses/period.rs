@@ -171,7 +171,7 @@ impl Losses {
     }
 }
 
-/// How fast the parts wear over the states of a sweep (docs/theory.md section 10.4).
+/// How fast the parts wear over the states of a sweep (docs/explanation/theory.md section 10.4).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wear {
     /// Depth of each part where a tooth touches it, one entry a state; none at a race, which has no such place.

@@ -1,4 +1,4 @@
-//! Wear by Archard's law (docs/theory.md section 10.4): volume per force and slip, as a depth per hour where a tooth touches a part.
+//! Wear by Archard's law (docs/explanation/theory.md section 10.4): volume per force and slip, as a depth per hour where a tooth touches a part.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! The boundary of a piece of the ring, in straight elements.
+//! Boundary of a piece of the ring, in straight elements.
 
 use std::f64::consts::PI;
 
@@ -9,22 +9,23 @@ use crate::position::Position;
 use crate::ring::RingFlank;
 use crate::root::NotConverged;
 
-/// Elements of either flank of the ring's tooth that is pressed; every other flank is a single one. With 64 of them, 16 on every other flank and a space
-/// more on either side the compliance in case 5.2 is another one by 0.13 of the 21 units that the contact with the ring gives way by, in the last twentieth
-/// of the flank by 0.4.
+/// Number of elements of either flank of the loaded ring tooth; every other flank is one element. Refinement to 64
+/// elements, with 16 on every other flank and one more space on either side, changes the compliance in case 5.2 by 0.13
+/// of the 21 units of the ring contact's compliance. In the last twentieth of the flank it is 0.4.
 const FINE: usize = 16;
 
-/// Elements of either half of its land, where the tip is bored, denser towards the flank's end; every other half is a single one. What the land would bear
-/// of a half-plane beside a force at the flank's end is what bends the tooth there.
+/// Number of elements of either half of the land of a bored tip, denser towards the flank's end; every other half is
+/// one element. The half-plane's traction on the land next to a force at the flank's end causes the tooth's bending
+/// there.
 const FINE_OF_LAND: usize = 8;
 
-/// Tooth spaces on either side of the one whose flank is pressed, at most.
+/// Largest number of tooth spaces on either side of the one whose flank is loaded.
 const SPACES_BESIDE: u64 = 2;
 
-/// How far behind its root the ring is held, in pitches of its teeth.
+/// Distance of the fixed arc behind the root, in pitches of the ring's teeth.
 const HELD_BEHIND: f64 = 1.0;
 
-/// Elements along each side of the piece of ring, and along the arc where it is held.
+/// Elements along each side of the piece of ring, and along the fixed arc.
 const ALONG_SIDE: u32 = 2;
 const ALONG_ARC: u32 = 8;
 
@@ -46,10 +47,10 @@ pub(super) fn flank_point(flank: &RingFlank, position: Position) -> Result<Point
     Ok(flank.point(&tooth, &flank.at(&tooth)))
 }
 
-/// A piece of the ring, in pitches, as its boundary has it: teeth on either side of a tooth space, and where it is held.
+/// Piece of the ring, in pitches: teeth on either side of a tooth space, and the fixed arc.
 pub(super) struct Piece {
-    /// Around the piece, the material on their left. The last [`KNOTS`] are those that a tooth presses, from the flank's end to the root, which is pressed
-    /// in the middle of its space.
+    /// Elements around the piece, the material on their left. The last [`KNOTS`] are loaded by a tooth, from the
+    /// flank's end to the root, which is loaded in the middle of its space.
     elements: Vec<Element>,
 }
 
@@ -59,7 +60,7 @@ impl Piece {
         let (lobes, ring_teeth) = (drive.lobes(), drive.parameters().ring_teeth.unsigned_abs());
         let mut fine = Vec::with_capacity(FINE + 1);
         for step in 0..FINE {
-            // The root's element reaches from one flank to the other; towards the end they become shorter.
+            // The root's element extends from one flank to the other; towards the end elements become shorter.
             let from_end = 1.0 - (step as f64 + 0.5) / (FINE as f64 + 0.5);
             let position_rad = limit.position.from_lobe_rad * (1.0 - from_end * from_end);
             fine.push(flank_point(flank, Position::from_lobe(position_rad, lobes))? / pitch_mm);
@@ -67,7 +68,7 @@ impl Piece {
         fine.push(flank_point(flank, limit.position)? / pitch_mm);
         let coarse = [fine[0], fine[FINE]];
         let half_pitch_rad = PI / ring_teeth as f64;
-        // From the middle of the tip, where a land or nothing lies beyond the flank.
+        // From the middle of the tip; beyond the flank is a land or nothing.
         let at_tip =
             |angle_rad: f64| Point2::new(angle_rad.cos(), angle_rad.sin()) * (drive.tip_radius_mm() / pitch_mm);
         let end_rad = fine[FINE].y.atan2(fine[FINE].x);
@@ -90,7 +91,7 @@ impl Piece {
             if is_pressed {
                 first_pressed = elements.len() + land_before.len();
             }
-            // Backwards about the axis, so that the material is on the left.
+            // Clockwise about the axis, so that the material is on the left.
             let forward = land_before.into_iter().chain(points(is_pressed).iter().rev().copied());
             let backward = points(is_behind).iter().copied().chain(land_behind.into_iter().rev()).map(mirrored);
             let outline: Vec<_> = forward.chain(backward).map(|point| turn * point).collect();
@@ -103,18 +104,18 @@ impl Piece {
         Ok(Self { elements })
     }
 
-    /// All of them.
+    /// Returns all elements.
     pub(super) fn elements(&self) -> &[Element] {
         &self.elements
     }
 
-    /// Those that a tooth presses.
+    /// Returns the elements that a tooth loads.
     pub(super) fn pressed(&self) -> &[Element] {
         &self.elements[self.elements.len() - KNOTS..]
     }
 }
 
-/// Outward from where the inner boundary ends, along the arc and inward to where it starts.
+/// Returns the elements outward from the end of the inner boundary, along the arc and inward to its start.
 fn held_around(from: Point2<f64>, to: Point2<f64>, radius: f64) -> impl Iterator<Item = Element> {
     let on_arc = |angle_rad: f64| Point2::new(angle_rad.cos(), angle_rad.sin()) * radius;
     let [start_rad, end_rad] = [from, to].map(|point| point.y.atan2(point.x));

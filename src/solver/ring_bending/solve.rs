@@ -1,4 +1,4 @@
-//! The system of boundary elements, put together and solved in columns that the compiler makes vectors of.
+//! System of boundary elements, assembled and solved in columns that the compiler can vectorise.
 
 use std::f64::consts::PI;
 
@@ -9,10 +9,11 @@ use crate::ring_bending::boundary::{Element, KNOTS, Piece};
 use crate::root::NotConverged;
 use crate::sweep::fast::lanes::{VECTOR, angle, fused, ln};
 
-/// How much further than a half-plane the ring gives way under a force on each of the elements that are pressed, along the force.
+/// Returns the displacement of the ring in excess of a half-plane, under a force on each of the loaded elements and
+/// along it.
 ///
 /// # Errors
-/// [`NotConverged`] where the system has no solution.
+/// [`NotConverged`] if the system has no solution.
 pub(super) fn further_than_half_plane(piece: &Piece, poissons_ratio: f64) -> Result<[f64; KNOTS], NotConverged> {
     let singular = NotConverged { what: "bending of the ring's teeth", iterations: 1, bracket_width: f64::INFINITY };
     pulp::Arch::new().dispatch(Solving { piece, poissons_ratio }).ok_or(singular)
@@ -43,20 +44,20 @@ impl WithSimd for Solving<'_> {
     }
 }
 
-/// The middles of all elements with the outward directions there, and whether they are held, in columns of whole vectors.
+/// Midpoints of all elements with their outward directions, and flags of the fixed ones, in columns of whole vectors.
 struct Points {
     count: usize,
     x: Vec<f64>,
     y: Vec<f64>,
     outward_x: Vec<f64>,
     outward_y: Vec<f64>,
-    /// 1 where the element is held, else 0.
+    /// 1 if the element is fixed, else 0.
     held: Vec<f64>,
 }
 
 impl Points {
     fn of(elements: &[Element]) -> Self {
-        // What fills the last vector up stands far away and counts for nothing.
+        // Padding of the last vector is far away and has no effect.
         const FAR: f64 = 1e3;
         let column = |of: fn(&Element) -> f64, beyond: f64| {
             let mut column: Vec<_> = elements.iter().map(of).collect();
@@ -73,7 +74,7 @@ impl Points {
         }
     }
 
-    /// With what fills the last vector up.
+    /// Returns the length with padding.
     fn len(&self) -> usize {
         self.x.len()
     }
@@ -85,7 +86,7 @@ struct Vectors {
     y: Vec<f64>,
 }
 
-/// What a vector of an element does at each point, for both of its components.
+/// Effect of a vector on an element at each point, for both of its components.
 struct Influence {
     of_x: Vectors,
     of_y: Vectors,
@@ -112,8 +113,8 @@ fn assembled<V: Simd>(piece: &Piece, points: &Points, poissons_ratio: f64) -> Sy
     let elements = piece.elements();
     let len = points.len();
     let first_pressed = elements.len() - KNOTS;
-    // What has to be added to the half-plane under each force: on free faces the opposite of its tractions, on held ones of its displacements. The face that
-    // bears the force bears no more than that.
+    // Added to the half-plane under each force: on free faces the negative of its tractions, on fixed ones of its
+    // displacements. The loaded face needs no correction.
     let mut added = Vec::with_capacity(KNOTS);
     for (force, element) in piece.pressed().iter().enumerate() {
         let mut vectors = Vectors::new(len);
@@ -150,8 +151,8 @@ fn assembled<V: Simd>(piece: &Piece, points: &Points, poissons_ratio: f64) -> Sy
     system
 }
 
-/// Kelvin's solution integrated over an element: what its own even unit traction moves each point by, and what its own even unit displacement does, in plane
-/// strain of a material with `E/(1 - ν²) = 1`.
+/// Integrates Kelvin's solution over an element: the displacement of each point by its uniform unit traction, and by
+/// its uniform unit displacement, in plane strain of a material with `E/(1 - ν²) = 1`.
 #[inline(always)]
 fn influence<V: Simd>(
     element: &Element,
@@ -176,7 +177,7 @@ fn influence<V: Simd>(
         // The ends as seen from the point, along the element.
         let (low, high) = (x - half, x + half);
         let (low_squared, high_squared) = (low * low + y * y, high * high + y * y);
-        // In the middle of the element itself the principal value.
+        // At the middle of the element itself the principal value.
         let seen_rad = angle::<V>(2.0 * half * y, low * high + y * y);
         let seen_rad = if y == 0.0 { 0.0 } else { seen_rad };
         let (ln_low, ln_high) = (ln::<V>(low_squared), ln::<V>(high_squared));
@@ -212,15 +213,15 @@ fn influence<V: Simd>(
     }
 }
 
-/// Flamant's solution for a unit force into an element, on a half-plane of the same material: of each point the opposite of its displacement where it is held,
-/// but for a motion of the whole, elsewhere of the traction on its face.
+/// Computes Flamant's solution for a unit force into an element, on a half-plane of the same material. For each point
+/// it gives the negative of the displacement (up to a rigid motion) if the point is fixed, otherwise of the traction.
 #[inline(always)]
 fn opposite_of_half_plane<V: Simd>(element: &Element, points: &Points, poissons_ratio: f64, vectors: &mut Vectors) {
-    // That of plane stress which plane strain is like.
+    // Equivalent Poisson's ratio of plane stress for plane strain.
     let nu = poissons_ratio / (1.0 - poissons_ratio);
     let inward = -element.outward;
     let across = Vector2::new(-inward.y, inward.x);
-    // Counted from the direction away from the axis, so that it jumps towards the axis alone, where no ring is.
+    // Angle from the direction away from the axis, so that it jumps only towards the axis, where there is no ring.
     let away = element.middle.coords;
     let to_away_rad = inward.perp(&away).atan2(inward.dot(&away));
     let len = points.len();
@@ -249,7 +250,8 @@ fn opposite_of_half_plane<V: Simd>(element: &Element, points: &Points, poissons_
     }
 }
 
-/// A dense system with several right-hand sides, by columns; the equations of x above those of y, each filled up with zeros to whole vectors.
+/// A dense system with several right-hand sides, by columns. The equations of x precede those of y, each padded with
+/// zeros to whole vectors.
 struct System {
     unknowns: usize,
     columns: Vec<Vec<f64>>,
@@ -261,7 +263,7 @@ impl System {
         Self { unknowns, columns: vec![vec![0.0; 2 * len]; unknowns + KNOTS] }
     }
 
-    /// Gaussian elimination with partial pivoting, column by column; whether there is a solution.
+    /// Runs Gaussian elimination with partial pivoting, column by column. Returns true if there is a solution.
     #[inline(always)]
     fn eliminate<V: Simd>(&mut self) -> bool {
         let mut pivots = Vec::with_capacity(self.unknowns);
@@ -296,7 +298,7 @@ impl System {
         true
     }
 
-    /// Two unknowns, from the first on, under a force.
+    /// Returns two unknowns, from the first on, under a force.
     fn solution(&self, force: usize, first: usize) -> [f64; 2] {
         let mut values = self.columns[self.unknowns + force].clone();
         for at in (first..self.unknowns).rev() {
@@ -310,7 +312,7 @@ impl System {
     }
 }
 
-/// Takes what the columns before have eliminated off a column; four at once, so that it is read and written a quarter as often.
+/// Subtracts the eliminated columns from a column, four at once, which needs a quarter of the memory accesses.
 #[inline(always)]
 fn subtract_earlier<V: Simd>(before: &[Vec<f64>], column: &mut [f64]) {
     let (fours, rest) = before.as_chunks::<4>();

@@ -1,5 +1,5 @@
-//! The input angles of a sweep to a tolerance: wherever the search for its extremes looked, and so near to each other that straight lines between them are true
-//! to a resolution.
+//! Input angles of a sweep to a tolerance: those at which the search for extremes evaluated the drive, plus enough
+//! others that linear interpolation between them meets a resolution.
 
 use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::mesh::{Mesh, PlacedTooth};
@@ -11,40 +11,40 @@ use crate::sweep::search::{AtPlace, Piece, Seen, search};
 use crate::sweep::unloaded;
 use crate::{SolveError, Stop};
 
-/// How true straight lines between the input angles are at least, over each column's peak: a plot that looks smooth.
+/// Largest error of linear interpolation between the input angles, over each column's peak: a plot that looks smooth.
 const COARSEST_RESOLUTION: f64 = 1e-2;
 
-/// The finest resolution; beyond it extremes are looked for one by one.
+/// The finest resolution. Below it extremes are searched for one by one.
 const FINEST_RESOLUTION: f64 = 1e-3;
 
-/// How the search looks at moments.
+/// Evaluation method of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Looking {
-    /// In columns, where that reaches.
+    /// In columns, if the fast path supports the drive.
     Fast,
     /// Tooth by tooth.
     Plain,
 }
 
-/// An input angle, and which teeth mesh there.
+/// An input angle, and the teeth in mesh there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Moment {
-    /// Share of the lap that has passed.
+    /// Elapsed share of the lap.
     pub(crate) fraction: f64,
     first: u64,
     last: u64,
-    /// The tooth that stands exactly where the flank ends, or where it enters.
+    /// The tooth that is exactly at the end of the flank, or exactly enters.
     exact: Option<AtPlace>,
 }
 
 impl Moment {
-    /// The teeth that are listed when so many laps have passed before.
+    /// Returns the listed teeth after this many elapsed laps.
     pub(crate) fn placed(self, mesh: &Mesh, lap: u64) -> impl Iterator<Item = PlacedTooth> {
         let mesh = *mesh;
         mesh.placed_between(self.first..=self.last, lap, move |place| self.position(&mesh, place))
     }
 
-    /// Places where teeth mesh.
+    /// Returns the number of places where teeth mesh.
     pub(crate) const fn places(&self) -> u64 {
         self.last + 1 - self.first
     }
@@ -55,15 +55,15 @@ impl Moment {
             .map_or_else(|| mesh.position_between(place, self.fraction), |at| at.position)
     }
 
-    /// Of a piece. A tooth that has reached the lobe has left.
+    /// Returns the moment of a piece. A tooth that has reached the lobe is no longer in mesh.
     pub(crate) fn of(piece: &Piece, fraction: f64) -> Self {
         let exact = piece.exactly_at(fraction).next();
         Self { fraction, first: if fraction < 1.0 { 1 } else { 2 }, last: piece.places, exact }
     }
 }
 
-/// The input angles of a sweep to a tolerance, in order, by lap: one that stands for all where items are alike. Where loads jump the same
-/// angle stands twice, first without the tooth that enters and then with it.
+/// Returns the input angles of a sweep to a tolerance, in order, by lap. If items are alike, one lap represents all. At
+/// a jump of the loads the same angle is listed twice: first without the tooth that enters, then with it.
 ///
 /// # Errors
 /// As [`search()`].
@@ -87,12 +87,12 @@ pub(crate) fn moments(
         Some(found) => found,
         None => {
             let mut look = PlainLook::new(loaded, load, stop);
-            // This way tells of every moment.
+            // The plain path covers every moment.
             search(&mut look, pieces(), tolerance, Some(resolution), stop)?.unwrap_or_default()
         }
     };
     let mut by_lap = vec![Vec::new(); usize::try_from(laps).unwrap_or(usize::MAX)];
-    // A wave generator that moves presses a tooth before it is lifted, as it is behind the valley then.
+    // If lever arms vary, a tooth is pressed before it is lifted, because it is then behind the valley.
     let loads_jump = mesh.loads_jump_at_entry() || load.parameters().wave_generator_moves;
     let without_load = if tolerance.looks_without_load() && loaded.has_gaps() {
         unloaded::extremes(PlainLook::new(loaded, load, stop), pieces(), tolerance, stop)?
@@ -106,7 +106,8 @@ pub(crate) fn moments(
         let extremes = without_load.iter().filter(|(piece, _)| piece.lap == lap);
         moments.extend(extremes.map(|(piece, fraction)| Moment::of(piece, *fraction)));
         if mesh.spacings_are_whole() {
-            // As a lap begins with a tooth at the end of the flank, so it ends: at a regular tip, where it carries nothing, at the same instant.
+            // A lap ends as it begins, with a tooth at the end of the flank. At a regular tip that tooth carries
+            // nothing.
             let last = mesh.whole_spacings() + 1;
             if !loads_jump {
                 moments.retain(|moment| moment.fraction < 1.0);

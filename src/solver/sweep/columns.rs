@@ -1,4 +1,4 @@
-//! What a sweep returns: columns of states and input angles, peaks, capacity, and the checks that it has to pass.
+//! Result of a sweep: columns of states and input angles, peaks, capacity, and the checks that it has to pass.
 
 use crate::SolveError;
 use crate::contact::{Contact, Materials, PerContact, SHEAR_DEPTH, SHEAR_SHARE, half_width_mm};
@@ -11,18 +11,18 @@ use crate::sweep::points::Points;
 use crate::tooth::point::ShearBelow;
 use crate::tooth::{Pressure, StressExponents};
 
-/// Forces that miss a torque by more than this share of it, or a period that fails to close by more than this share of a peak, are wrong: some
-/// ten thousand times what rounding does to the worst design that is known.
+/// Largest allowed residual of torque balance (share of the torque) and of period closure (share of a peak). It is
+/// about ten thousand times the rounding error of the worst known design.
 const MOST_RESIDUAL: f64 = 1e-9;
 
-/// The torques that must come out: `M0` at the wave generator, `M0 Z_K/U` at the ring, `M0 Z_G/U` at the carrier.
+/// Expected torques: `M0` at the wave generator, `M0 Z_K/U` at the ring, `M0 Z_G/U` at the carrier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TorqueBalance {
     per_nmm: PerContact<f64>,
 }
 
 impl TorqueBalance {
-    /// Of a drive under an input torque.
+    /// Returns the torques of a drive under an input torque.
     pub fn new(drive: &Drive, input_torque_nmm: f64) -> Self {
         let per_nmm = PerContact {
             wave_generator: 1.0 / input_torque_nmm,
@@ -32,7 +32,7 @@ impl TorqueBalance {
         Self { per_nmm }
     }
 
-    /// The largest relative deviation of the torques that did come out; not a number where one of them is none.
+    /// Returns the largest relative deviation of computed torques; NaN if one of them is NaN.
     #[inline(always)]
     pub fn residual(&self, torque_nmm: &PerContact<f64>) -> f64 {
         let off_cam = (torque_nmm.wave_generator * self.per_nmm.wave_generator - 1.0).abs();
@@ -45,53 +45,53 @@ impl TorqueBalance {
     }
 }
 
-/// The larger of a residual and those before; what is not a number is the worst of all.
+/// Returns the larger of a residual and the earlier ones. NaN counts as the largest.
 #[inline(always)]
 pub(crate) fn worse(residual: f64, before: f64) -> f64 {
     if residual.is_nan() || residual > before { residual } else { before }
 }
 
-/// The states of a sweep, by input angle and then tooth number: columns of equal length, one entry a state. Where the zones are alike the
-/// teeth of one stand for all, elsewhere the teeth of all zones are listed ([`Mesh`]).
+/// States of a sweep, by input angle and then tooth number: columns of equal length with one entry for each state. If
+/// the zones are alike, the teeth of one zone represent all. Otherwise the teeth of all zones are listed ([`Mesh`]).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct States {
-    /// Input angle j.
+    /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
-    /// Tooth number, 0 being the tooth in the middle of a lobe at j = 0.
+    /// Tooth number. Tooth 0 is in the middle of a lobe at j = 0.
     pub tooth: Vec<u32>,
-    /// The lobe that the tooth is on; empty where the zones are alike.
+    /// Lobe of the tooth; empty if the zones are alike.
     pub lobe: Vec<u32>,
-    /// Position ψ, from the middle of the lobe.
+    /// Position ψ from the middle of the lobe, in deg.
     pub position_deg: Vec<f64>,
-    /// Distance `d` of the tooth's centre from the axis.
+    /// Distance `d` of the tooth's centre from the axis, in mm.
     pub center_radius_mm: Vec<f64>,
-    /// φ_H: contact point on the cam, from the valley.
+    /// φ_H: angle of the contact point on the cam from the valley, in deg.
     pub wave_generator_angle_deg: Vec<f64>,
-    /// φ_K: contact point on the ring, from the ring's tooth tip.
+    /// φ_K: angle of the contact point on the ring from the tip of the ring's tooth, in deg.
     pub ring_angle_deg: Vec<f64>,
-    /// `F_H`, `F_K`, `F_S`.
+    /// Contact forces `F_H`, `F_K`, `F_S`, in N.
     pub force_n: PerContact<Vec<f64>>,
-    /// Hertz stresses `σ_H`, `σ_K`, `σ_S`.
+    /// Hertz stresses `σ_H`, `σ_K`, `σ_S`, in MPa.
     pub stress_mpa: PerContact<Vec<f64>>,
 }
 
-/// What holds for all teeth at an input angle: columns of equal length, one entry an input angle.
+/// Quantities of all teeth together at an input angle: columns of equal length with one entry for each input angle.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct InputAngles {
-    /// Input angle j.
+    /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
-    /// `Δφ`: how far the wave generator turns under the load, clearances included.
+    /// Wind-up `Δφ`: rotation of the wave generator under the load, clearances included, in deg.
     pub wind_up_deg: Vec<f64>,
-    /// `(Z_G/U)² dM0/dΔφ`: output torque over output rotation, input held, at the load.
+    /// Torsional stiffness `(Z_G/U)² dM0/dΔφ`: output torque over output rotation, input held, at the load.
     pub torsional_stiffness_nm_per_rad: Vec<f64>,
-    /// Of the teeth that are listed, those that carry load.
+    /// Number of listed teeth that carry load.
     pub loaded_teeth: Vec<u32>,
 }
 
-/// The largest value of a column, and the state where it stands.
+/// Largest value of a column, and the state in which it occurs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// The value, in the column's unit.
+    /// Value, in the column's unit.
     pub value: f64,
     /// Input angle of the state.
     pub input_angle_deg: f64,
@@ -102,20 +102,21 @@ pub struct Peak {
 /// Peaks of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactPeaks {
-    /// Of the force, in N.
+    /// Peak of the force, in N.
     pub force_n: Peak,
-    /// Of the stress, in MPa.
+    /// Peak of the stress, in MPa.
     pub stress_mpa: Peak,
-    /// Half the width of the contact, in the plane of motion, where the stress has its peak.
+    /// Half the width of the contact in the plane of motion at the stress peak, in mm.
     pub half_width_mm: f64,
-    /// Half its length along the axis there, of an ellipse.
+    /// Half the length of a contact ellipse along the axis at the stress peak, in mm.
     pub half_length_mm: Option<f64>,
-    /// The largest shear stress below the surface there, and how deep it stands; none under a flat, whose edges are not modelled.
+    /// Largest shear stress below the surface at the stress peak, and its depth. None for a flat, whose edges are not
+    /// modelled.
     pub shear: Option<PeakShear>,
 }
 
 impl ContactPeaks {
-    /// Of a line contact, which bears `force_n` where its stress has its peak.
+    /// Returns the peaks of a line contact with force `force_n` at its stress peak.
     pub(crate) fn of_line(force_peak_n: Peak, stress_peak_mpa: Peak, force_n: f64, tooth_width_mm: f64) -> Self {
         let half_width_mm = half_width_mm(force_n, stress_peak_mpa.value, tooth_width_mm);
         Self {
@@ -132,7 +133,7 @@ impl ContactPeaks {
 }
 
 impl ContactPeaks {
-    /// Those of a line with what is the own of a contact of this pressure, which bears `force_n` where its stress has its peak.
+    /// Returns these peaks with the data of a contact of this pressure model and force `force_n` at its stress peak.
     pub(crate) fn of_pressure(
         self,
         pressure: &Pressure,
@@ -153,7 +154,7 @@ impl ContactPeaks {
                         depth_mm: depth * half_width_mm.min(half_length_mm),
                     }
                 };
-                // Of the two bodies the one where it is larger.
+                // The larger of the values in the two bodies.
                 let [tooth, partner] = [&materials.teeth, materials.partner(contact)].map(|body| body.poissons_ratio);
                 let (of_tooth, are_alike) = (shear(tooth), partner.to_bits() == tooth.to_bits());
                 let of_partner = if are_alike { of_tooth } else { shear(partner) };
@@ -164,32 +165,32 @@ impl ContactPeaks {
     }
 }
 
-/// The largest shear stress below a contact.
+/// Largest shear stress below the surface of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeakShear {
-    /// Its value.
+    /// Shear stress, in MPa.
     pub stress_mpa: f64,
-    /// Its depth.
+    /// Depth below the surface, in mm.
     pub depth_mm: f64,
 }
 
-/// What limits the torque.
+/// Torque capacity and the contact that limits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TorqueCapacity {
-    /// The largest torque at the wave generator under which no contact exceeds the allowable stress.
+    /// Largest torque at the wave generator under which no contact exceeds its allowable stress, in N·m.
     pub input_torque_nm: f64,
-    /// The same at the carrier.
+    /// The corresponding torque at the carrier, in N·m.
     pub output_torque_nm: f64,
-    /// The contact that limits it; the nearest to its allowable stress where none reaches it.
+    /// The contact that limits the torque, or the nearest to its allowable stress if none reaches it.
     pub contact: Contact,
-    /// Whether none does before the wave generator turns past its teeth.
+    /// True if no contact reaches its stress before the wave generator rotates past its teeth.
     pub turns_past_teeth: bool,
-    /// The input angle where it does.
+    /// Input angle of the limit, in deg.
     pub input_angle_deg: f64,
 }
 
 impl TorqueCapacity {
-    /// Where all loads are in proportion: of line contacts `M0 min (σ_a/σ)²`.
+    /// Returns the capacity if all loads are proportional: for line contacts `M0 min (σ_a/σ)²`.
     pub(crate) fn in_proportion(
         drive: &Drive,
         input_torque_nm: f64,
@@ -214,14 +215,15 @@ impl TorqueCapacity {
     }
 }
 
-/// A sweep over one period; where items deviate, over as many as it takes until they meet again as they did.
+/// A sweep over one period. If items deviate, it covers the load periods after which all items are back in their
+/// positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
-    /// The mesh that it went through.
+    /// Mesh of the sweep.
     pub mesh: Mesh,
-    /// The states.
+    /// States of the teeth.
     pub states: States,
-    /// What holds at each input angle.
+    /// Quantities at each input angle.
     pub input_angles: InputAngles,
     /// Peaks over the states.
     pub peaks: PerContact<ContactPeaks>,
@@ -229,20 +231,21 @@ pub struct Sweep {
     pub torque_capacity: Option<TorqueCapacity>,
     /// Largest relative deviation of the input, ring and carrier torques from `M0`, `M0 Z_K/U`, `M0 Z_G/U`.
     pub torque_balance_residual: f64,
-    /// Largest difference of a force or stress at the last input angle from that angle worked out anew, over the column's peak.
+    /// Largest difference of a force or stress at the last input angle from its independent recalculation, over the
+    /// peak.
     pub period_closure_residual: f64,
 }
 
-/// What a sweep comes to, its states left out: what searches ask of millions of drives.
+/// Summary of a sweep without its states, for searches over millions of drives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepPeaks {
     /// Peaks over the states.
     pub contacts: PerContact<ContactPeaks>,
-    /// Of `Δφ` over the input angles.
+    /// Range of the wind-up `Δφ` over the input angles, in deg.
     pub wind_up_deg: Extremes,
-    /// Of the stiffness at the output over the input angles.
+    /// Range of the output torsional stiffness over the input angles.
     pub torsional_stiffness_nm_per_rad: Extremes,
-    /// Of the teeth that are listed, those that carry load.
+    /// Number of listed teeth that carry load.
     pub loaded_teeth: TeethInMesh,
     /// The torque capacity, given an allowable stress.
     pub torque_capacity: Option<TorqueCapacity>,
@@ -250,20 +253,20 @@ pub struct SweepPeaks {
     pub torque_balance_residual: f64,
 }
 
-/// The least and the largest of a column.
+/// Least and largest value of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extremes {
-    /// The least.
+    /// Least value.
     pub least: f64,
-    /// The largest.
+    /// Largest value.
     pub largest: f64,
 }
 
 impl Extremes {
-    /// Of no value yet.
+    /// Extremes of no values.
     pub(crate) const NONE: Self = Self { least: f64::INFINITY, largest: f64::NEG_INFINITY };
 
-    /// Those of a column.
+    /// Returns the extremes of a column.
     pub fn of(column: &[f64]) -> Self {
         column.iter().fold(Self::NONE, |seen, &value| seen.with(value))
     }
@@ -274,7 +277,7 @@ impl Extremes {
     }
 }
 
-/// What all teeth together come to at the input angles so far.
+/// Running extremes over the input angles so far.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AngleExtremes {
     wind_up_deg: Extremes,
@@ -286,7 +289,7 @@ impl AngleExtremes {
     pub(crate) const NONE: Self =
         Self { wind_up_deg: Extremes::NONE, torsional_stiffness_nm_per_rad: Extremes::NONE, loaded_teeth: None };
 
-    /// One further.
+    /// Adds an input angle.
     #[inline(always)]
     pub(crate) fn see(&mut self, wind_up_deg: f64, torsional_stiffness_nm_per_rad: f64, loaded_teeth: u64) {
         self.wind_up_deg = self.wind_up_deg.with(wind_up_deg);
@@ -296,7 +299,7 @@ impl AngleExtremes {
         self.loaded_teeth = Some(TeethInMesh { min: min.min(loaded_teeth), max: max.max(loaded_teeth) });
     }
 
-    /// With what each contact comes to.
+    /// Returns the summary, given the peaks of each contact.
     pub(crate) fn peaks(
         self,
         contacts: PerContact<ContactPeaks>,
@@ -315,7 +318,7 @@ impl AngleExtremes {
 }
 
 impl SweepPeaks {
-    /// How far the carrier lags and leads over the period under the load: the range of the wind-up at the output.
+    /// Returns the transmission error under load, peak to peak: the range of the wind-up, referred to the output.
     pub fn transmission_error_peak_to_peak_deg(&self, drive: &Drive) -> f64 {
         (self.wind_up_deg.largest - self.wind_up_deg.least) / drive.teeth_per_wave()
     }
@@ -335,14 +338,14 @@ impl From<&Sweep> for SweepPeaks {
 }
 
 impl Sweep {
-    /// How far the carrier lags and leads over the period under the load: the range of the wind-up at the output.
+    /// Returns the transmission error under load, peak to peak: the range of the wind-up, referred to the output.
     pub fn transmission_error_peak_to_peak_deg(&self, drive: &Drive) -> f64 {
         let wind_up_deg = self.input_angles.wind_up_deg.iter().copied();
         let most = wind_up_deg.clone().fold(f64::NEG_INFINITY, f64::max);
         (most - wind_up_deg.fold(f64::INFINITY, f64::min)) / drive.teeth_per_wave()
     }
 
-    /// Least and most teeth of a zone that carry load: of those in mesh, those whose gaps are closed.
+    /// Returns the least and the largest number of teeth in a zone that are in mesh with their gaps closed.
     pub fn loaded_teeth(&self) -> TeethInMesh {
         let teeth = self.input_angles.loaded_teeth.iter().map(|&teeth| u64::from(teeth));
         TeethInMesh { min: teeth.clone().min().unwrap_or(0), max: teeth.max().unwrap_or(0) }
@@ -365,7 +368,7 @@ impl States {
         }
     }
 
-    /// With the teeth of all zones, to be filled in.
+    /// Returns columns of zeros with the teeth of all zones, to be filled in.
     pub(crate) fn of_zeros(count: usize) -> Self {
         let column = || vec![0.0; count];
         Self {
@@ -381,12 +384,12 @@ impl States {
         }
     }
 
-    /// Number of states.
+    /// Returns the number of states.
     pub fn len(&self) -> usize {
         self.tooth.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there is no state.
     pub fn is_empty(&self) -> bool {
         self.tooth.is_empty()
     }
@@ -396,7 +399,7 @@ impl States {
     }
 }
 
-/// The states where the force and the stress of a contact have their peaks.
+/// Indices of the states with the peaks of a contact's force and stress.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PeakAt {
     pub(crate) force: usize,
@@ -414,7 +417,7 @@ impl InputAngles {
         }
     }
 
-    /// To be filled in.
+    /// Returns columns of zeros, to be filled in.
     pub(crate) fn of_zeros(count: usize) -> Self {
         let column = || vec![0.0; count];
         Self {
@@ -425,20 +428,20 @@ impl InputAngles {
         }
     }
 
-    /// The stiffness at the output of `dM0/dΔφ`.
+    /// Returns the torsional stiffness at the output for `dM0/dΔφ`.
     #[inline(always)]
     pub(crate) fn of_output(drive: &Drive, stiffness_nmm_per_rad: f64) -> f64 {
         let torque_ratio = drive.teeth_per_wave();
         1e-3 * stiffness_nmm_per_rad * torque_ratio * torque_ratio
     }
 
-    /// Appends an input angle; the stiffness `dM0/dΔφ` becomes that of the output.
+    /// Appends an input angle. The stiffness `dM0/dΔφ` is converted to that at the output.
     pub(crate) fn push(&mut self, drive: &Drive, input_angle_deg: f64, wind_up: &WindUp, loaded_teeth: usize) {
         let stiffness = std::iter::once(wind_up.stiffness_nmm_per_rad);
         self.extend(drive, &[input_angle_deg], &[wind_up.rotation_rad()], stiffness, std::iter::once(loaded_teeth));
     }
 
-    /// Appends some input angles at once.
+    /// Appends several input angles.
     #[inline(always)]
     pub(crate) fn extend(
         &mut self,
@@ -455,7 +458,7 @@ impl InputAngles {
         self.loaded_teeth.extend(loaded_teeth.map(|teeth| u32::try_from(teeth).unwrap_or(u32::MAX)));
     }
 
-    /// Appends the first input angle again, a period on.
+    /// Appends the first input angle again, one period later.
     pub(crate) fn repeat_first(&mut self, input_angle_deg: f64) {
         self.input_angle_deg.push(input_angle_deg);
         self.wind_up_deg.push(self.wind_up_deg[0]);
@@ -463,7 +466,7 @@ impl InputAngles {
         self.loaded_teeth.push(self.loaded_teeth[0]);
     }
 }
-/// What the plain path and the fast one both make of a sweep.
+/// Result of both the plain and the fast path.
 pub(crate) struct Columns {
     pub(crate) states: States,
     pub(crate) input_angles: InputAngles,
@@ -471,7 +474,7 @@ pub(crate) struct Columns {
     pub(crate) torque_balance_residual: f64,
 }
 
-/// A sweep with what follows from its states: peaks and closure, if its checks say nothing against it.
+/// Returns a sweep with its peaks and closure, or an error if a check fails.
 pub(crate) fn finished(
     loaded: &LoadedDrive<'_>,
     points: Points,
@@ -487,14 +490,14 @@ pub(crate) fn finished(
     });
     let mut period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
     if loaded.mesh().tells_items_apart() {
-        // That the items have met again as they did shows in what all teeth together make.
+        // The wind-up shows whether all items are back in their positions.
         let wind_up_deg = &input_angles.wind_up_deg;
         let ends_deg = [wind_up_deg.first(), wind_up_deg.last()].map(|end| end.copied().unwrap_or(f64::NAN));
         let [first_deg, last_deg] = ends_deg;
         period_closure_residual = worse((last_deg - first_deg).abs() / last_deg, period_closure_residual);
     }
     check("torque balance", torque_balance_residual)?;
-    // Light loads across wide gaps, or at corners, keep fewer digits: the answer says how few.
+    // Light loads across wide gaps, or at corners, keep fewer digits. The residual in the answer shows how many.
     if let Err(inconsistent) = check("period closure", period_closure_residual) {
         let of_rounding = ROUNDINGS * f64::EPSILON * input_angles.amplification(loaded)?;
         if period_closure_residual.is_nan() || period_closure_residual > of_rounding {
@@ -505,12 +508,13 @@ pub(crate) fn finished(
     Ok(Sweep { mesh, states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
 }
 
-/// How many roundings of closing angles part two ways to the same loads.
+/// Number of rounding errors of closing angles by which two paths to the same loads may differ.
 const ROUNDINGS: f64 = 32.0;
 
 impl InputAngles {
-    /// How much a relative error of a closing angle becomes in what is turned beyond it, at most: `Δφ K/M0`, one or so without gaps. What a tooth keeps
-    /// from a corner is a difference of two distances, and has their rounding.
+    /// Returns the largest amplification of a relative error of a closing angle in the rotation beyond it: `Δφ K/M0`,
+    /// about 1 without gaps. The gap of a tooth at a corner is a difference of two distances and has their rounding
+    /// error.
     fn amplification(&self, loaded: &LoadedDrive<'_>) -> Result<f64, NotConverged> {
         let ratio = loaded.drive().teeth_per_wave();
         let per_torque = 1e3 / (loaded.input_torque_nmm() * ratio * ratio);
@@ -523,7 +527,7 @@ impl InputAngles {
     }
 }
 
-/// That a residual is one of rounding.
+/// Checks that a residual is only rounding.
 pub(crate) fn check(check: &'static str, residual: f64) -> Result<(), SolveError> {
     if residual.is_nan() || residual > MOST_RESIDUAL {
         return Err(SolveError::Inconsistent { check, residual });
@@ -531,8 +535,8 @@ pub(crate) fn check(check: &'static str, residual: f64) -> Result<(), SolveError
     Ok(())
 }
 
-/// The largest difference of a load at the last input angle from that angle worked out anew, one state at a time and from positions found
-/// another way: by angles where the sweep goes by whole numbers, and the other way about.
+/// Returns the largest difference of a load at the last input angle from its recalculation. The recalculation is state
+/// by state and finds positions by the other method: by angles if the sweep uses whole numbers, and vice versa.
 fn period_closure(
     loaded: &LoadedDrive<'_>,
     points: Points,
@@ -560,7 +564,7 @@ fn period_closure(
         }
         let loads = loaded.loads(tooth, &wind_up)?;
         for ((contact, peaks), (force_n, stress_mpa)) in peaks.iter().zip(loads[..3].iter().zip(&loads[3..])) {
-            // Where corners alone press the teeth there is no stress at the ring.
+            // If only corners press the teeth, there is no stress at the ring.
             let off = |found: f64, anew: f64, peak: f64| {
                 let off = (found - anew).abs();
                 if off > 0.0 { off / peak } else { off }

@@ -1,19 +1,20 @@
-//! A whole sweep at equally spaced input angles, many states at a time.
+//! Sweep at equally spaced input angles, evaluated for many states at a time.
 //!
-//! The formulas are those of the plain path ([`crate::locus`], [`crate::ring`], [`crate::load_sharing`]), which stays as the oracle; here they
-//! run over columns instead of one tooth, without a branch or a call, so that the compiler makes vectors of them. Three things make
-//! that possible:
+//! The formulas are those of the plain path ([`crate::locus`], [`crate::ring`], [`crate::load_sharing`]), which remains
+//! the reference. Here they process columns instead of one tooth, without branches and calls, so that the compiler can
+//! vectorise them. Three properties make that possible:
 //!
-//! - Equally spaced positions need no new sines: a tooth at a sample stands at the sum of a few angles, and the sine of a sum is made of
-//!   products. The sums are taken so that nothing cancels near an axis.
-//! - The support `h` follows by Halley's method for all states at once, with as many steps as the slowest of them needs: one or two.
-//! - The only transcendental functions left are two arctangents of small ratios, for which a few terms of their series are enough; how many
-//!   depends on the drive alone.
+//! - Equally spaced positions need no new sines. The position of a tooth is a sum of a few angles, and the sine of a
+//!   sum is a sum of products. The sums are chosen so that nothing cancels near an axis.
+//! - The support `h` follows by Halley's method for all states at once. The slowest state sets the number of steps: one
+//!   or two.
+//! - The only remaining transcendental functions are two arctangents of small ratios. A few terms of their series are
+//!   enough; the number depends only on the drive.
 //!
-//! What is left has three divisions and five square roots a state, beside the division of the position.
+//! Each state then needs three divisions and five square roots, plus the division of the position.
 //!
-//! Vectors are four doubles wide where the machine has AVX2, which is found out when the program runs (`pulp`). Eight, with AVX-512, were
-//! 5 % slower on the Xeon that this was measured on.
+//! Vectors are four doubles wide on machines with AVX2, detected at run time (`pulp`). Eight doubles with AVX-512 were
+//! 5 % slower on the Xeon used for the measurement.
 
 mod centers;
 mod curve;
@@ -51,14 +52,14 @@ use sharing::{Limit, Shared, Sharing, Teeth, Work};
 use sinks::{ColumnSink, PeakSink, Sink};
 use tile::{Run, Tile, TileLanes, TileSize};
 
-/// Steps towards the support at most. A drive that needs more goes the plain way.
+/// Largest number of steps towards the support. A drive that needs more uses the plain path.
 const MAX_STEPS: u32 = 8;
 
-/// A relative step this small is the last: the next one would be of its cube, less than the last digit.
+/// A relative step this small is the last: the next would be proportional to its cube, below the last digit.
 const LAST_STEP: f64 = 5e-6;
 
-/// The sweep and its capacity, given an allowable stress, or nothing where the plain path has to make it: for laws that are not known here, where a part may be too
-/// full, and for drives beyond the caps.
+/// Returns the sweep and its capacity for an allowable stress. Returns none if the plain path has to compute it: for
+/// laws without columns, possible interference, and drives beyond the limits.
 ///
 /// # Errors
 /// As [`columns::finished`].
@@ -83,7 +84,7 @@ pub(crate) fn sweep(
     Ok(Some(sweep))
 }
 
-/// The peaks of the same sweep, no state kept, where zones are alike; nothing where [`sweep`] has nothing.
+/// Returns the peaks of the same sweep without its states, for zones that are alike; none in the cases of [`sweep`].
 ///
 /// # Errors
 /// As [`sweep`].
@@ -106,7 +107,8 @@ pub(crate) fn peaks(
     Ok(Some(peaks))
 }
 
-/// The moments of a sweep to a tolerance over these pieces, between which straight lines are true to a resolution; nothing where [`sweep`] has nothing.
+/// Returns the moments of a sweep to a tolerance over these pieces, with linear interpolation true to a resolution.
+/// Returns none in the cases of [`sweep`].
 ///
 /// # Errors
 /// As [`search()`].
@@ -127,7 +129,7 @@ pub(crate) fn moments(
     search(&mut look, pieces, tolerance, Some(resolution), stop)
 }
 
-/// The true peaks to a tolerance; nothing where [`sweep`] has nothing.
+/// Returns the true peaks to a tolerance; none in the cases of [`sweep`].
 ///
 /// # Errors
 /// As [`search()`], and as [`sweep`].
@@ -164,8 +166,8 @@ pub(crate) fn true_peaks(
     Ok(Some(look.angles.peaks(contacts, torque_capacity, look.torque_balance_residual)))
 }
 
-/// The sweep as `pulp` wants it: compiled once for each instruction set, the best one of this machine picked when the program runs. Whatever
-/// it calls must be inlined into it, or it would be compiled for none of them.
+/// Sweep in the form that `pulp` needs. It is compiled once for each instruction set, and the best one is chosen at run
+/// time. All functions called must be inlined, otherwise they would not be vectorised.
 struct Vectorised<'a, K> {
     kernel: &'a Kernel,
     loaded: &'a LoadedDrive<'a>,
@@ -183,7 +185,7 @@ impl<K: Sink> pulp::WithSimd for Vectorised<'_, K> {
     }
 }
 
-/// The constants of a drive under a load.
+/// Constants of a drive under a load.
 struct Kernel {
     shape: Shape,
     r: f64,
@@ -197,11 +199,11 @@ struct Kernel {
     /// Terms of the arctangent for the angle on the cam and on the ring.
     cam_terms: usize,
     ring_terms: usize,
-    /// The stress that a torque capacity is asked for, where it does not follow from the peaks.
+    /// Allowable stress, if the torque capacity does not follow from the peaks.
     allowable_mpa: Option<PerContact<f64>>,
 }
 
-/// What says where the teeth's centres are.
+/// Shape that determines the centres of the teeth.
 enum Shape {
     Ellipse(EllipseShape),
     Eccentric(EccentricCenters),
@@ -210,8 +212,8 @@ enum Shape {
 }
 
 impl Shape {
-    /// With bounds, over all positions, of how far the contact points on cam and ring are off the position, as tangents; of a kind
-    /// that has no columns yet nothing: it goes the plain way.
+    /// Returns the shape, with bounds over all positions of the angle between contact points (cam, ring) and position,
+    /// as tangents. Returns none for a kind without columns, which uses the plain path.
     fn new(cam: &Cam, r: f64) -> Option<(Self, PerContact<f64>)> {
         // On the ring by sin β ≤ 1, from the least distance of a centre.
         let bounds =
@@ -221,7 +223,7 @@ impl Shape {
             Cam::Ellipse(cam) => {
                 let shape = EllipseShape::new(cam, r);
                 let EllipseShape { a, b, difference_of_squares, .. } = shape;
-                // By the inequality of the means.
+                // By the inequality of arithmetic and geometric means.
                 let ratio = difference_of_squares * r * a / (2.0 * a * b * ((b * b + r * b) * (a * a + r * b)).sqrt());
                 (Self::Ellipse(shape), bounds(ratio, b + r))
             }
@@ -243,7 +245,7 @@ impl Shape {
     }
 }
 
-/// The ellipse, of which the support is looked for.
+/// The ellipse, whose support is computed iteratively.
 struct EllipseShape {
     a: f64,
     b: f64,
@@ -258,8 +260,8 @@ impl EllipseShape {
         Self { a, b, r, difference_of_squares: cam.difference_of_squares_mm2(), guess: Guess::new(a, b, r) }
     }
 
-    /// The support h: the root in [b, a] of sin² (a² + rh)² (h² - b²) - cos² (b² + rh)² (a² - h²), by Halley's method, whose one division
-    /// does what takes Newton's two. Nothing where that is too slow.
+    /// Returns the support h: the root in [b, a] of sin² (a² + rh)² (h² - b²) - cos² (b² + rh)² (a² - h²), by Halley's
+    /// method. Its one division replaces two of Newton's steps. Returns none if it converges too slowly.
     #[inline(always)]
     fn supports(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<[f64; LANES]> {
         let Self { a, b, r, .. } = *self;
@@ -296,29 +298,30 @@ impl EllipseShape {
     }
 }
 
-/// What a sweep comes to beside what its sink holds.
+/// Results of a sweep that are not in its sink.
 struct Filled {
     torque_balance_residual: f64,
     capacity: Option<TorqueCapacity>,
 }
 
-/// How the teeth share the load.
+/// Load-sharing method.
 enum Law {
-    /// A linear law without gaps: unit loads are those of a rotation of 1, and one factor for each input angle is left.
+    /// A linear law without gaps: unit loads are those of a rotation of 1, to be scaled by one factor for each input
+    /// angle.
     Linear(Compliance),
-    /// Any other one: unit loads are those of 1 N at the wave generator.
+    /// Any other law: unit loads are those of 1 N at the wave generator.
     Sharing(Sharing),
 }
 
-/// What loads are those of one unit of.
+/// Unit of the unit loads.
 trait Unit: Copy {
-    /// What the reciprocal of a state's loads has to hold, from the squares of `h + r` and `h'`, which add up to `d²`.
+    /// Returns the divisor of a state's loads, from the squares of `h + r` and `h'`, which add up to `d²`.
     fn denominator(self, above2: f64, lever2: f64) -> f64;
 
-    /// `F_H` over `d²`, with the reciprocal of that denominator.
+    /// Returns `F_H` over `d²`, given the reciprocal of that divisor.
     fn load(self, lever: f64, per_denominator: f64) -> f64;
 
-    /// What stands where stresses do: `√(F Σ E*/(π L1))` of a line whose relative curvature is Σ.
+    /// Returns the value stored as stress: `√(F Σ E*/(π L1))` for a line contact of relative curvature Σ.
     #[inline(always)]
     fn stress(self, force: f64, curvature: f64, hertz: f64) -> f64 {
         (force * curvature * hertz).sqrt()
@@ -353,7 +356,7 @@ impl Unit for Newton {
     }
 }
 
-/// 1 N at the wave generator of a tooth whose contacts are no lines: in the place of stresses it leaves curvatures.
+/// 1 N at the wave generator of a tooth without line contacts: stores curvatures in place of stresses.
 #[derive(Clone, Copy)]
 struct NewtonOnBall;
 
@@ -374,7 +377,7 @@ impl Unit for NewtonOnBall {
     }
 }
 
-/// `c d²` of a tooth for a linear law: this much for each `(h + r)²` and `h'²`, which add up to `d²`.
+/// `c d²` of a tooth under a linear law: coefficients of `(h + r)²` and `h'²`, which add up to `d²`.
 #[derive(Clone, Copy)]
 struct Compliance {
     of_above: f64,
@@ -399,7 +402,7 @@ impl Compliance {
     }
 }
 
-/// Where the support is looked for first: the series of h in ε = (a - b)/(a + b), as far as its third power.
+/// Initial value of the support: the series of h in ε = (a - b)/(a + b) up to its third power.
 #[derive(Clone, Copy)]
 struct Guess {
     mean: f64,
@@ -457,7 +460,8 @@ impl Kernel {
         })
     }
 
-    /// The capacity where all loads are in proportion (docs/theory.md section 4.7): that of the stress nearest to what is allowed.
+    /// Returns the capacity if all loads are proportional (docs/explanation/theory.md section 4.7): that of the stress
+    /// nearest to its limit.
     fn in_proportion(
         &self,
         loaded: &LoadedDrive<'_>,
@@ -470,7 +474,7 @@ impl Kernel {
         })
     }
 
-    /// Adds to peaks what a contact that is no line has of its own.
+    /// Adds to the peaks the data of contacts other than line contacts.
     fn complete(
         &self,
         loaded: &LoadedDrive<'_>,
@@ -490,31 +494,32 @@ impl Kernel {
         Ok(())
     }
 
-    /// Of tiles of input angles anywhere.
+    /// Returns the size of tiles for arbitrary input angles.
     fn tile_size(&self, mesh: &Mesh, layout: Layout) -> TileSize {
         let places = mesh.teeth_in_mesh().max / mesh.listed_at_each_place();
         self.with_room(TileSize::anywhere(layout.at_each_place * whole(places)))
     }
 
-    /// With room for what its law takes.
+    /// Returns the size with the memory that the law needs.
     fn with_room(&self, size: TileSize) -> TileSize {
         let are_unlike = self.gaps.as_ref().is_some_and(GapColumns::are_unlike);
         size.with(matches!(self.law, Law::Sharing(_)), are_unlike)
     }
 
-    /// Whether the gaps are those of single items.
+    /// Returns true if gaps belong to individual items.
     fn tells_items_apart(&self) -> bool {
         self.gaps.as_ref().is_some_and(GapColumns::are_of_items)
     }
 
-    /// How the teeth of a sweep lie in its tiles: where none is told apart, one at each place.
+    /// Returns the order of teeth in the tiles. If items are not distinguished, there is one tooth at each place.
     fn layout(&self, mesh: &Mesh) -> Layout {
         let at_each_place = if self.tells_items_apart() { whole(mesh.lobes_loaded_alike()) } else { 1 };
         let apart = if mesh.zones_are_alike() { 1 } else { whole(mesh.laps_of_load_period()) };
         Layout { at_each_place, apart }
     }
 
-    /// Fills the sink, by the best vectors of this machine; the worst residual of the torques, or nothing where the plain path is needed.
+    /// Fills the sink with the best vectors of this machine. Returns the largest torque residual, or none if the plain
+    /// path is needed.
     fn fill(
         &self,
         loaded: &LoadedDrive<'_>,
@@ -525,7 +530,7 @@ impl Kernel {
         pulp::Arch::new().dispatch(Vectorised { kernel: self, loaded, laps, stop, sink })
     }
 
-    /// Over the zones of a drive as one, whose positions come again in each lap.
+    /// Runs the sweep over the superposed zones of a drive, whose positions repeat in each lap.
     #[inline(always)]
     fn sweep<V: Simd, K: Sink>(
         &self,
@@ -592,7 +597,7 @@ impl Kernel {
         Ok(Some(filled))
     }
 
-    /// Geometry of all states of a tile, and their forces and stresses for one unit; false where a support takes too many steps.
+    /// Computes geometry and unit loads of all states of a tile. Returns false if a support takes too many steps.
     #[inline(always)]
     fn unit_loads<V: Simd, K: Sink>(&self, tile: &mut Tile<'_>) -> bool {
         let are_found = match (&self.law, &self.pressures) {
@@ -605,7 +610,7 @@ impl Kernel {
 
     #[inline(always)]
     fn loads_of<K: Sink>(&self, unit: impl Unit, tile: &mut Tile<'_>) -> bool {
-        // No iterator's method, which would not be compiled for the vectors that this is.
+        // A plain loop: an iterator's method would not be compiled for these vectors.
         for chunk in 0..tile.count.div_ceil(LANES) {
             let are_found = match &self.shape {
                 Shape::Ellipse(ellipse) => self.on_ellipse::<K>(ellipse, unit, tile, chunk),
@@ -620,7 +625,7 @@ impl Kernel {
         true
     }
 
-    /// Geometry of a stretch of states, and their forces and stresses for one unit; false where the support takes too many steps.
+    /// Computes geometry and unit loads of a chunk of states. Returns false if the support takes too many steps.
     #[inline(always)]
     fn on_ellipse<K: Sink>(&self, ellipse: &EllipseShape, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
         let TileLanes { sin, cos, force, stress, torque } = tile.lanes(chunk);
@@ -635,12 +640,13 @@ impl Kernel {
         let tooth_curvature = 1.0 / r;
         let per_squares = 1.0 / (a2 * b2);
         let (ring_hertz, carrier_hertz) = (self.hertz.ring * tooth_curvature, self.hertz.carrier * tooth_curvature);
-        // Divisions and roots cost most here. One reciprocal of a product serves all its factors, and γ and β are written with lengths,
-        // tan γ = h'/(h + r), cos γ = (h + r)/d, tan β = k tan γ, cos β = (h + r)/e, so that d and e are the only roots.
+        // Divisions and roots cost most. One reciprocal of a product serves all its factors. γ and β are written with
+        // lengths, tan γ = h'/(h + r), cos γ = (h + r)/d, tan β = k tan γ, cos β = (h + r)/e, so that d and e are the
+        // only roots.
         for i in 0..LANES {
             let h = support[i];
             let (above, sin_i, cos_i) = (h + r, sin[i], cos[i]);
-            // The normal's direction, from the position's.
+            // Direction of the normal, from that of the position.
             let (along_major, along_minor) = (cos_i * (b2 + r * h), sin_i * (a2 + r * h));
             let length2 = along_major * along_major + along_minor * along_minor;
             let cube = h * h * h;
@@ -657,13 +663,13 @@ impl Kernel {
             // The derivative of tan γ is d² `bend` over (h + r)³.
             let second = (a - b) * (b * along_minor * along_minor - a * along_major * along_major) * per_length2_h;
             let bend = (lever2 * (h * h) - above * second * (ab + h * h)) * (h * per_curvature_sum);
-            // The regularity 1 + … is this over e³ d.
+            // The regularity 1 + … is this value over e³ d.
             let e3_d = e2 * de;
             let regular = e3_d + r * (above * e2 + k2 * d2 * bend);
             let least = f64::EPSILON * e3_d;
             let regular = if regular > least { regular } else { least };
             let denominator = unit.denominator(above2, lever2);
-            // Tangents of the angles that the contact points are off the position.
+            // Tangents of the angles between contact points and position.
             let cam_below = b2 * (along_minor * sin_i) + a2 * (along_major * cos_i);
             let ring_below = de + r * above;
 
@@ -696,7 +702,8 @@ impl Kernel {
         true
     }
 
-    /// The same for wave generators that tell where the centres are: `cos γ = 1/V`, `V² = 1 + T²`, and `cos β = 1/W`, `W² = 1 + k²T²`.
+    /// The same for other wave generators, from their centres: `cos γ = 1/V`, `V² = 1 + T²`, and `cos β = 1/W`,
+    /// `W² = 1 + k²T²`.
     #[inline(always)]
     fn on_path<K: Sink>(&self, centers: &impl Centers, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
         let TileLanes { sin, cos, force, stress, torque } = tile.lanes(chunk);
@@ -718,7 +725,7 @@ impl Kernel {
             let above = d * cos_gamma;
             let lever = above * tan;
             let (above2, lever2) = (above * above, lever * lever);
-            // The regularity 1 + rκ is this over d W³.
+            // The regularity 1 + rκ is this value over d W³.
             let flat = d * (w * w2);
             let regular = flat + r * (w2 + k * k * tan_derivative[i]);
             let least = f64::EPSILON * flat;
@@ -741,7 +748,7 @@ impl Kernel {
             torque.ring[i] = force_h * (cos_gamma * ring_tan) * d;
             torque.carrier[i] = force_s * d;
             if K::COLUMNS {
-                // Tangents of the angles that the contact points are off the position.
+                // Tangents of the angles between contact points and position.
                 let (cam_below, ring_below) = (d * v - r, d * w + r);
                 let all = r * tan / (cam_below * ring_below);
                 cam_ratio[i] = all * ring_below;
@@ -755,7 +762,7 @@ impl Kernel {
         true
     }
 
-    /// Notes where contact points are, by tangents of the angles by which they are off the position.
+    /// Stores the angles of contact points, given the tangents of their angles to the position.
     #[inline(always)]
     fn place(&self, tile: &mut Tile<'_>, chunk: usize, mut cam_ratio: [f64; LANES], mut ring_ratio: [f64; LANES]) {
         let from_valley = &tile.from_valley_rad.as_chunks::<LANES>().0[chunk];
@@ -770,7 +777,7 @@ impl Kernel {
         }
     }
 
-    /// What the places of a tile decide of law and gaps; false where it takes the plain path.
+    /// Computes what depends on the places of a tile: law and gaps. Returns false if it needs the plain path.
     #[inline(always)]
     fn prepare<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
         let Law::Sharing(sharing) = &self.law else { return true };
@@ -779,7 +786,8 @@ impl Kernel {
         self.gaps.as_ref().is_none_or(|gaps| gaps.prepare(&teeth, gap_work, work.closing))
     }
 
-    /// Closes the gaps of the teeth of a lap, where they are told apart; false where the tile takes the plain path.
+    /// Closes the gaps of the teeth of a lap if items are distinguished. Returns false if the tile needs the plain
+    /// path.
     #[inline(always)]
     fn close(&self, mesh: &Mesh, lap_teeth: &LapTeeth, count: usize, tile: &mut Tile<'_>) -> bool {
         let Some(gaps) = self.gaps.as_ref().filter(|gaps| gaps.are_of_items()) else { return true };
@@ -788,8 +796,8 @@ impl Kernel {
         gaps.close_at_items(&teeth, gap_work, work.closing)
     }
 
-    /// Loads of a tile from its unit loads, and what limits them; nothing where it takes the plain path. Where more than a rotation is looked for, `shared`
-    /// is told of what sharing has come to before the limit is looked for in its place.
+    /// Computes the loads of a tile from its unit loads, and their limits. Returns none if it needs the plain path. If
+    /// a limit is searched for, `shared` receives the result of load sharing first, because the limit overwrites it.
     #[inline(always)]
     fn loads<V: Simd>(
         &self,
@@ -814,7 +822,7 @@ impl Kernel {
         Some(limit)
     }
 
-    /// Turns the wave generator at each input angle of a tile until the unit loads of its teeth balance the torque.
+    /// Rotates the wave generator at each input angle of a tile until the loads balance the torque.
     #[inline(always)]
     fn scale(loaded: &LoadedDrive<'_>, teeth: usize, tile: &mut Tile<'_>) {
         let rows = tile.sum_torques::<true>(teeth);
@@ -833,7 +841,7 @@ impl Kernel {
             ring[row] *= scale;
             carrier[row] *= scale;
         }
-        // Only a tooth in the valley, at the last place, has no lever arm and no load.
+        // Only a tooth in the valley, at the last place, has neither lever arm nor load.
         let lasts = tile.force.wave_generator[..tile.count].iter().skip(tile.last_place).step_by(teeth);
         tile.row_loaded.clear();
         tile.row_loaded.extend(lasts.map(|last| teeth - usize::from(*last <= 0.0)));
@@ -841,7 +849,7 @@ impl Kernel {
         repeat_each(rotation_root, teeth, tile.scale_root);
     }
 
-    /// The teeth of a tile under 1 N, what sharing works on, and what comes of it.
+    /// Returns the teeth of a tile under 1 N, and the inputs and outputs of load sharing.
     #[inline(always)]
     fn teeth_of<'t, 'a>(
         &self,
@@ -865,14 +873,14 @@ impl Kernel {
         (teeth, &mut tile.work, &mut tile.gaps, shared)
     }
 
-    /// Lets the teeth of each input angle share the load; false where it takes the plain path.
+    /// Shares the load among the teeth of each input angle. Returns false if it needs the plain path.
     #[inline(always)]
     fn share<V: Simd>(&self, sharing: &Sharing, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
         let (teeth, work, _, mut shared) = self.teeth_of(count, tile);
         sharing.share::<V>(loaded.input_torque_nmm() / loaded.zones(), &teeth, work, &mut shared)
     }
 
-    /// What limits the teeth once they share the load; nothing where it takes the plain path.
+    /// Returns the limit of the teeth after load sharing; none if it needs the plain path.
     #[inline(always)]
     fn limit<V: Simd>(
         &self,
@@ -886,7 +894,7 @@ impl Kernel {
         sharing.limit::<V>(&per_allowable, &teeth, work)
     }
 
-    /// Torques, stiffness and what carries, once the load is shared.
+    /// Computes torques, stiffness and the number of carrying teeth after load sharing.
     #[inline(always)]
     fn scale_shared<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) {
         let zones = loaded.zones();
@@ -913,7 +921,7 @@ impl Kernel {
         tile.row_loaded.extend(tile.scale[..tile.count].chunks_exact(count).map(carrying));
     }
 
-    /// The worst residual of the torques of a tile, and of those before.
+    /// Returns the largest torque residual of a tile and of the earlier ones.
     #[inline(always)]
     fn residual(balance: &TorqueBalance, rows: usize, tile: &mut Tile<'_>, before: f64) -> f64 {
         for row in 0..rows {
@@ -925,7 +933,7 @@ impl Kernel {
 }
 
 impl Limit {
-    /// The capacity that it stands for at an input angle.
+    /// Returns the torque capacity at an input angle.
     fn capacity(&self, loaded: &LoadedDrive<'_>, input_angle_deg: f64) -> TorqueCapacity {
         let input_torque_nm = 1e-3 * (loaded.zones() * self.torque_nmm);
         let output_torque_nm = input_torque_nm * loaded.drive().teeth_per_wave();
@@ -934,7 +942,7 @@ impl Limit {
     }
 }
 
-/// The first of the least, whichever is found first.
+/// Returns the smaller of two capacities, and the first of equal ones, independent of the order of evaluation.
 fn least(before: Option<TorqueCapacity>, capacity: TorqueCapacity) -> Option<TorqueCapacity> {
     let is_first = |before: &TorqueCapacity| {
         let order = before.input_torque_nm.total_cmp(&capacity.input_torque_nm);

@@ -1,4 +1,4 @@
-//! Means over the period of a sweep to a tolerance. They do not depend on where a sweep looked.
+//! Means over the period of a sweep to a tolerance. They do not depend on the sweep's input angles.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -11,52 +11,53 @@ use crate::sweep::adaptive::Moment;
 use crate::sweep::search::Piece;
 use crate::{SolveError, Stop};
 
-/// Stretches that a piece between two jumps is cut into at first.
+/// Initial number of intervals for each piece between two jumps.
 const FIRST_STRETCHES: u32 = 4;
 
-/// Enough for the finest tolerance, where values are not rounded more than it.
+/// Enough for the finest tolerance if the values are not rounded more than that.
 const ENOUGH_MOMENTS: u64 = 4096;
 
-/// If twice as many moments leave this share of the error, more of them do not help.
+/// If twice as many moments leave this share of the error, further refinement does not help.
 const STAGNATION: f64 = 0.75;
 
-/// The finest tolerance that rounding leaves reachable.
+/// Finest tolerance that rounding leaves reachable.
 const FINEST: f64 = 1e-10;
 
-/// Moments that are looked at in each lap, at most.
+/// Largest number of moments in each lap.
 const MOST_MOMENTS: u32 = 100_000;
 
 /// Several quantities at a moment.
 type Values<const N: usize> = [f64; N];
 
-/// A stretch of a lap with the values at its ends, its middle and its quarters.
+/// Interval of a lap with the values at its ends, its middle and its quarters.
 struct Stretch<const N: usize> {
     piece: usize,
     start: f64,
     end: f64,
     values: [Values<N>; 5],
-    /// How far Simpson's rule over the whole is from that over the halves, of all quantities together.
+    /// Difference of Simpson's rule over the whole and over the halves, summed over all quantities.
     error: f64,
 }
 
 impl<const N: usize> Stretch<N> {
     fn new(piece: usize, start: f64, end: f64, values: [Values<N>; 5]) -> Self {
         let mut stretch = Self { piece, start, end, values, error: 0.0 };
-        // Over the halves the error of what is smooth is a fifteenth of the difference. Bends are not, and both are counted in full.
+        // For smooth curves the error over the halves is 1/15 of the difference. Kinks are not smooth: count the full
+        // difference.
         let [low, lower, middle, upper, high] = &stretch.values;
         let differs = |n: usize| (low[n] - 4.0 * lower[n] + 6.0 * middle[n] - 4.0 * upper[n] + high[n]).abs();
         stretch.error = (end - start) / 12.0 * (0..N).map(differs).sum::<f64>();
         stretch
     }
 
-    /// The integral over the halves.
+    /// Returns the integral over the halves.
     fn area(&self, n: usize) -> f64 {
         let [low, lower, middle, upper, high] = &self.values;
         (self.end - self.start) / 12.0 * (low[n] + 4.0 * lower[n] + 2.0 * middle[n] + 4.0 * upper[n] + high[n])
     }
 }
 
-/// By error.
+/// Orders by error.
 impl<const N: usize> Ord for Stretch<N> {
     fn cmp(&self, other: &Self) -> Ordering {
         self.error.total_cmp(&other.error)
@@ -77,10 +78,10 @@ impl<const N: usize> PartialEq for Stretch<N> {
 
 impl<const N: usize> Eq for Stretch<N> {}
 
-/// The means of quantities, none below zero, to a tolerance over the sum of them, but not below 1e-10: adaptive quadrature between the jumps, the stretch with the largest error
-/// first.
+/// Returns the means of non-negative quantities to a tolerance relative to their sum, but at least 1e-10. The method is
+/// adaptive quadrature between the jumps, largest error first.
 ///
-/// # Errors
+/// Errors of the load sharing, and [`SolveError::Stopped`].
 /// Those of the load sharing, and [`SolveError::Stopped`].
 pub(crate) fn means<const N: usize>(
     loaded: &LoadedDrive<'_>,
@@ -123,7 +124,7 @@ pub(crate) fn means<const N: usize>(
         }
     }
     let mut checked: Option<(u64, f64)> = None;
-    // Sums are made anew now and then, so that no rounding of them adds up.
+    // The sum is recomputed regularly, so that rounding errors do not accumulate.
     loop {
         let error = errors(&stretches);
         let areas = total(&stretches);
@@ -149,7 +150,8 @@ pub(crate) fn means<const N: usize>(
                 excess += half.error;
                 stretches.push(half);
             }
-            // Twice as many moments at least halve the error of bends. If they do not, it is rounding of the values themselves.
+            // Twice as many moments at least halve the error of kinks. If they do not, the values themselves are
+            // rounded.
             let enough = ENOUGH_MOMENTS * pieces.len() as u64;
             let (before, error_before) = checked.unwrap_or((enough / 2, f64::INFINITY));
             if looked >= 2 * before {
@@ -168,12 +170,12 @@ pub(crate) fn means<const N: usize>(
     }
 }
 
-/// The sum of the errors of all stretches.
+/// Returns the sum of the errors of all intervals.
 fn errors<const N: usize>(stretches: &BinaryHeap<Stretch<N>>) -> f64 {
     stretches.iter().map(|stretch| stretch.error).sum()
 }
 
-/// The integrals over all stretches.
+/// Returns the integrals over all intervals.
 fn total<const N: usize>(stretches: &BinaryHeap<Stretch<N>>) -> Values<N> {
     std::array::from_fn(|n| stretches.iter().map(|stretch| stretch.area(n)).sum())
 }

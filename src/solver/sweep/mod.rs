@@ -25,13 +25,12 @@ pub use columns::{
 pub use points::{Points, Tolerance};
 pub use unloaded::unloaded_wind_up_deg;
 
-/// The sweep over one period.
+/// Runs the sweep over one period.
 ///
 /// # Errors
-/// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] where no finite forces exist,
-/// [`SolveError::TooManyStates`] at a tolerance that takes more of them than allowed,
-/// [`SolveError::Inconsistent`] where the answer's own checks say that it is wrong,
-/// [`SolveError::Stopped`] when `stop` says so.
+/// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] if no finite forces exist,
+/// [`SolveError::TooManyStates`] if a tolerance needs more states than allowed, [`SolveError::Inconsistent`] if the
+/// answer's own checks fail, [`SolveError::Stopped`] if `stop` is set.
 pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
     swept(&LoadedDrive::new(drive, load)?, load, points, stop)
 }
@@ -45,12 +44,12 @@ fn swept(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &dyn S
     plain::sweep(loaded, load, points, Looking::Fast, stop)
 }
 
-/// The sweep of a drive of which single items deviate: by slot and lobe, over as many load periods as it takes until they meet again as they
-/// did ([`Deviations::mesh`]).
+/// Runs the sweep of a drive with deviations of individual items. States are listed by slot and lobe. The sweep covers
+/// the load periods after which all items are back in their positions ([`Deviations::mesh`]).
 ///
 /// # Errors
-/// As [`sweep`]; [`SolveError::Impossible`] for deviations that this drive or this load cannot have, [`SolveError::Interference`] where
-/// a part is too full.
+/// As [`sweep`]; [`SolveError::Impossible`] for deviations that this drive or this load cannot have,
+/// [`SolveError::Interference`] if a tooth is pressed without load.
 pub fn sweep_with_deviations(
     drive: &Drive,
     load: &LoadCase,
@@ -64,8 +63,9 @@ pub fn sweep_with_deviations(
     swept(&LoadedDrive::deviating(drive, load, deviations)?, load, points, stop)
 }
 
-/// What the sweep over one period comes to, without its states: the same peaks, in less time. That the period closes is not looked at. Where zones
-/// are unlike they are looked at over each other, and what the states would show in one lap after the other is told of the first.
+/// Returns the peaks of the sweep over one period without its states, in less time. Period closure is not checked. If
+/// zones are not alike, they are evaluated superposed: what the states would show in successive laps is reported for
+/// the first.
 ///
 /// # Errors
 /// As [`sweep`].
@@ -87,7 +87,8 @@ pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) ->
     }
 }
 
-/// The same sweep, state by state: what the fast path is held against, and what is left where it does not reach.
+/// Runs the same sweep state by state: the reference for the fast path, and the fallback for drives it does not
+/// support.
 ///
 /// # Errors
 /// As [`sweep`].
@@ -95,7 +96,7 @@ pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn St
     plain::sweep(&LoadedDrive::new(drive, load)?, load, points, Looking::Plain, stop)
 }
 
-/// The same of a drive of which single items deviate.
+/// Runs the same for a drive with deviations of individual items.
 ///
 /// # Errors
 /// As [`sweep_with_deviations`].

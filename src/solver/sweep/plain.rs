@@ -1,4 +1,4 @@
-//! A sweep state by state: what the fast path is held against, and what is left where it does not reach.
+//! Sweep state by state: the reference for the fast path, and the fallback for drives it does not support.
 
 use crate::contact::{Contact, Materials, PerContact};
 use crate::load_sharing::{LawEnd, LoadCase, LoadedDrive, ToothState, TorqueLimit};
@@ -14,7 +14,7 @@ use crate::sweep::points::Points;
 use crate::tooth::Pressure;
 use crate::{SolveError, Stop};
 
-/// The pressure that has the largest stress of a contact so far.
+/// Pressure with the largest stress of a contact so far.
 #[derive(Debug, Clone, Copy)]
 struct Hardest {
     stress_mpa: f64,
@@ -23,13 +23,13 @@ struct Hardest {
 }
 
 impl States {
-    /// The first of the largest values of a column, and where it stands; nothing of none.
+    /// Returns the first of the largest values of a column and its index; none for an empty column.
     fn first_peak(&self, column: &[f64]) -> Option<(usize, Peak)> {
         let at = peak_at(column);
         (!column.is_empty()).then(|| (at, self.peak(column, at)))
     }
 
-    /// Lets all states go, and keeps their room.
+    /// Removes all states and keeps their memory.
     fn clear(&mut self) {
         let Self {
             input_angle_deg,
@@ -59,12 +59,12 @@ impl InputAngles {
     }
 }
 
-/// The first of the largest values of a column.
+/// Returns the index of the first of the largest values of a column.
 fn peak_at(column: &[f64]) -> usize {
     column.iter().enumerate().fold(0, |at, (index, &value)| if value > column[at] { index } else { at })
 }
 
-/// The sweep.
+/// Runs the sweep.
 ///
 /// # Errors
 /// As [`sweep`](crate::sweep::sweep()).
@@ -89,7 +89,7 @@ pub(crate) fn sweep(
         }
         Points::Tolerance(tolerance) => {
             let by_lap = adaptive::moments(loaded, load, tolerance, looking, stop)?;
-            // Each place was counted once; listed it may stand for several teeth, and in every lap.
+            // Each place was counted once. It may represent several listed teeth, and occurs in every lap.
             let places = by_lap.iter().flatten().map(|moment| moment.places()).sum::<u64>();
             let listed = places * (mesh.laps() / by_lap.len() as u64) * mesh.listed_at_each_place();
             let limit = tolerance.max_states();
@@ -97,9 +97,9 @@ pub(crate) fn sweep(
                 return Err(SolveError::TooManyStates { limit });
             }
             let lap_deg = mesh.sweep_period_deg() / mesh.laps() as f64;
-            // Where items are alike, all laps are.
+            // If items are alike, so are all laps.
             for (lap, moments) in (0..mesh.laps()).zip(by_lap.iter().cycle()) {
-                // A lap begins where the one before has ended.
+                // A lap begins at the end of the one before.
                 for moment in &moments[usize::from(lap > 0)..] {
                     if stop.stopped() {
                         return Err(SolveError::Stopped);
@@ -112,7 +112,7 @@ pub(crate) fn sweep(
     columns.finish(points, &load.parameters().materials)
 }
 
-/// The peaks of a sweep by equal intervals, of which some states are kept at a time.
+/// Returns the peaks of a sweep over equal intervals, keeping only some states at a time.
 ///
 /// # Errors
 /// As [`sweep`](crate::sweep::sweep()).
@@ -148,13 +148,13 @@ pub(crate) fn peaks(
     Ok(seen.angles.peaks(contacts, columns.torque_capacity, columns.torque_balance_residual))
 }
 
-/// What the states of a sweep came to that are kept no more.
+/// Summary of the states that are no longer kept.
 struct SeenSoFar {
     contacts: PerContact<SeenAt>,
     angles: AngleExtremes,
 }
 
-/// The first of the largest at a contact.
+/// First of the largest values at a contact.
 #[derive(Debug, Clone, Copy)]
 struct SeenAt {
     force_n: Peak,
@@ -173,7 +173,7 @@ impl Default for SeenSoFar {
 }
 
 impl SeenSoFar {
-    /// Looks at all that has grown, and clears it away.
+    /// Summarises the states collected so far and clears them.
     fn take(&mut self, columns: &mut Growing<'_>) {
         let Growing { states, input_angles, .. } = columns;
         self.contacts = PerContact::of(|contact| {
@@ -200,14 +200,14 @@ impl SeenSoFar {
     }
 }
 
-/// A sweep as it grows by input angles.
+/// Sweep that is built input angle by input angle.
 struct Growing<'a> {
     loaded: &'a LoadedDrive<'a>,
     allowable_stress_mpa: Option<PerContact<f64>>,
     states: States,
     input_angles: InputAngles,
     torque_capacity: Option<TorqueCapacity>,
-    /// Where the least of the limits is no stress but the end of Johnson's law.
+    /// Set if the least limit is the end of Johnson's law instead of a stress.
     law_end: Option<LawEnd>,
     balance: TorqueBalance,
     torque_balance_residual: f64,
@@ -234,7 +234,7 @@ impl<'a> Growing<'a> {
     }
 
     fn reserve(&mut self, states: u64) {
-        // A count that memory can hold; the caller has bounded it.
+        // The caller has bounded the count to what fits in memory.
         self.states = States::with_capacity(usize::try_from(states).unwrap_or(usize::MAX));
     }
 
@@ -273,7 +273,7 @@ impl<'a> Growing<'a> {
         Ok(())
     }
 
-    /// Appends geometry, forces and stresses of the teeth, and returns how many carry load.
+    /// Appends geometry, forces and stresses of the teeth. Returns the number of teeth that carry load.
     fn share_load(&mut self, wind_up: &WindUp) -> Result<usize, NotConverged> {
         let flank = self.loaded.drive().flank();
         let states = &mut self.states;
@@ -292,7 +292,7 @@ impl<'a> Growing<'a> {
             let stress_mpa = self.loaded.stress_mpa(tooth, &force_n);
             for (contact, &stress_mpa) in stress_mpa.iter() {
                 let hardest = self.hardest.get_mut(contact);
-                // The first of equal ones, as among the states.
+                // The first of equal values, as among the states.
                 if hardest.is_none_or(|before| stress_mpa > before.stress_mpa) {
                     let (force_n, pressure) = (*force_n.get(contact), *tooth.pressure.get(contact));
                     *hardest = Some(Hardest { stress_mpa, force_n, pressure });
@@ -302,13 +302,13 @@ impl<'a> Growing<'a> {
             states.stress_mpa.push(stress_mpa);
 
             let sin_ring = point.tan_pressure_angle * point.cos_pressure_angle;
-            // Where the wave generator moves on under a tooth, all three moments are counted at the arm that it comes to.
+            // If lever arms vary, all three moments use the arm after wind-up.
             let arm_mm = center.cam_contact.lever_arm_mm;
             let turned_mm = tooth.spring.turned_static_arm_mm(&wind_up.rotation) - arm_mm;
             let moved_nmm = zones * force_n.wave_generator * turned_mm;
             torque_nmm.wave_generator += zones * force_n.wave_generator * arm_mm + moved_nmm;
             let ring_nmm = zones * force_n.ring * sin_ring * center.center_radius_mm;
-            // What a corner takes more, or less, than a flank would, the carrier takes too.
+            // A corner's moment differs from a flank's; the carrier carries the difference.
             let beyond_nmm = if matches!(tooth.pressure.ring, Pressure::Corner(_)) {
                 ring_nmm - zones * force_n.wave_generator * arm_mm * flank.teeth_per_wave()
             } else {
@@ -323,7 +323,7 @@ impl<'a> Growing<'a> {
         Ok(loaded_teeth)
     }
 
-    /// The peaks of a contact with what its hardest pressure makes of them.
+    /// Returns the peaks of a contact, completed from its hardest pressure.
     fn complete(&self, peaks: ContactPeaks, materials: &Materials, contact: Contact) -> ContactPeaks {
         match self.hardest.get(contact) {
             Some(Hardest { force_n, pressure, .. }) => peaks.of_pressure(pressure, *force_n, materials, contact),

@@ -1,4 +1,4 @@
-//! The search for the extremes of a sweep, looking tooth by tooth.
+//! Search for the extremes of a sweep, evaluated tooth by tooth.
 
 use crate::contact::PerContact;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
@@ -7,9 +7,10 @@ use crate::root::NotConverged;
 use crate::sweep::search::{LOADS, Look, Piece, Seen};
 use crate::{SolveError, Stop};
 
-/// Moments tooth by tooth.
+/// Evaluates moments tooth by tooth.
 pub(crate) struct PlainLook<'a> {
-    /// With one tooth at each place of the mesh, which stands for all that carry alike; where items deviate, with every tooth.
+    /// With one tooth at each place of the mesh, which represents all that carry alike. If items deviate, with every
+    /// tooth.
     loaded: LoadedDrive<'a>,
     mesh: Mesh,
     allowable_stress_mpa: Option<PerContact<f64>>,
@@ -32,15 +33,15 @@ impl<'a> PlainLook<'a> {
         }
     }
 
-    /// The drive, and how many teeth each that is looked at stands for.
+    /// Returns the drive, with the number of teeth that each evaluated tooth represents.
     pub(crate) const fn loaded(&self) -> &LoadedDrive<'a> {
         &self.loaded
     }
 
-    /// The teeth of a piece, place by place.
+    /// Returns the teeth of a piece, place by place.
     ///
     /// # Errors
-    /// Those of a tooth, with the input angle.
+    /// Errors of a tooth, with the input angle.
     pub(crate) fn teeth(&self, piece: &Piece, fraction: f64) -> Result<Vec<ToothState>, SolveError> {
         if self.stop.stopped() {
             return Err(SolveError::Stopped);
@@ -58,7 +59,7 @@ impl<'a> PlainLook<'a> {
         }
         let position = |place| piece.position(mesh, place, fraction);
         let mut placed: Vec<_> = mesh.placed_between(1..=piece.places, piece.lap, position).collect();
-        // Those at one place stay in the order of their slots.
+        // Teeth at one place keep the order of their slots.
         placed.sort_by(|one, other| one.position.from_lobe_rad.total_cmp(&other.position.from_lobe_rad));
         placed.iter().map(|tooth| self.loaded.tooth_at(&tooth.place, tooth.position)).collect()
     }
@@ -128,7 +129,7 @@ mod tests {
     use crate::{Compatibility, ContactLaw, Drive, LoadParameters, Material, Materials, Modification, Never, Torque};
 
     #[test]
-    fn the_teeth_that_are_pressed_are_those_that_carry() {
+    fn pressed_teeth_are_those_that_carry() {
         let drive = Drive::new(&PAPER_5_1).expect("a possible drive");
         let steel = Material::STEEL;
         let case = LoadCase::new(&LoadParameters {

@@ -1,19 +1,19 @@
-//! Where a sweep looks.
+//! Input angles of a sweep.
 
 use crate::mesh::Samples;
 use crate::violation::{Parameter, Violation};
 
-/// Where a sweep looks.
+/// Input angles of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Points {
-    /// So many equal intervals of one period, both ends included.
+    /// Equal intervals of one period, both ends included.
     Samples(Samples),
-    /// Wherever it takes to find the true extremes to a tolerance.
+    /// Input angles chosen so that the true extremes are found to a tolerance.
     Tolerance(Tolerance),
 }
 
 impl Points {
-    /// So many equal intervals of one period.
+    /// Returns equal intervals of one period.
     ///
     /// # Errors
     /// As [`Samples::new`].
@@ -21,7 +21,7 @@ impl Points {
         Samples::new(count).map(Self::Samples)
     }
 
-    /// Wherever it takes to find the true extremes to a tolerance, with so many states worked out on the way at most.
+    /// Returns a tolerance for the true extremes, with a limit of evaluated states.
     ///
     /// # Errors
     /// As [`Tolerance::new`].
@@ -29,13 +29,13 @@ impl Points {
         Tolerance::new(relative, max_states).map(Self::Tolerance)
     }
 
-    /// The same to the finest tolerance that there is.
+    /// Returns the finest tolerance.
     pub const fn finest(max_states: u64) -> Self {
         let relative = Parameter::SweepTolerance.range().low;
         Self::Tolerance(Tolerance { relative, max_states, looks_without_load: false })
     }
 
-    /// The same, where a tolerance is given also with the input angles at which the wind-up without load is least and largest.
+    /// Also searches for the input angles with the least and the largest wind-up without load. Needs a tolerance.
     #[must_use]
     pub const fn also_without_load(self) -> Self {
         match self {
@@ -45,11 +45,12 @@ impl Points {
     }
 }
 
-/// How true the extremes of a sweep are to be.
+/// Accuracy of the extremes of a sweep.
 ///
-/// The relative tolerance holds for the largest value of every force and stress, for the least and the largest of wind-up and torsional
-/// stiffness and for the torque capacity; its root for the places where they stand and for half-widths; of the transmission error the
-/// tolerance times the wind-up; the same without load, where it is looked for.
+/// The relative tolerance applies to the largest value of every force and stress, and to the torque capacity. It also
+/// applies to the least and the largest wind-up and torsional stiffness. Its square root applies to the positions of
+/// the extremes and to half-widths. The error of the transmission error is the tolerance times the wind-up. The same
+/// holds without load, if that is searched for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     relative: f64,
@@ -61,24 +62,24 @@ impl Tolerance {
     /// Checks the tolerance.
     ///
     /// # Errors
-    /// A tolerance out of its range.
+    /// Fails if the tolerance is out of its range.
     pub fn new(relative: f64, max_states: u64) -> Result<Self, Violation> {
         Parameter::SweepTolerance
             .check(relative)
             .map_or(Ok(Self { relative, max_states, looks_without_load: false }), Err)
     }
 
-    /// The relative tolerance.
+    /// Returns the relative tolerance.
     pub const fn relative(&self) -> f64 {
         self.relative
     }
 
-    /// Whether the extremes of the wind-up without load are looked for too.
+    /// Returns true if the extremes of the wind-up without load are searched for too.
     pub(crate) const fn looks_without_load(&self) -> bool {
         self.looks_without_load
     }
 
-    /// Most states that may be worked out.
+    /// Returns the largest number of states that may be evaluated.
     pub const fn max_states(&self) -> u64 {
         self.max_states
     }

@@ -1,9 +1,9 @@
-//! Where the extremes of a sweep stand (docs/theory.md section 9, *True extremes*).
+//! Search for the extremes of a sweep (docs/explanation/theory.md section 9, *True extremes*).
 //!
-//! A lap is cut where a tooth enters. In between, every load of every tooth and every total of them all is a smooth curve over the input
-//! angle, with gaps between two changes of the teeth that carry. A few moments show where the curves may be largest: polynomials through six of
-//! them say how high one may stand between two, and how far they are to be trusted. Only what may still exceed the largest value that was seen is
-//! looked at again, all quantities together.
+//! A lap is cut where a tooth enters. Between two cuts, every load of every tooth and every total is a smooth curve
+//! over the input angle. With gaps, the curves are smooth between two changes of the set of carrying teeth. A few
+//! evaluated moments bound the curves: polynomials through six of them estimate the maximum between two, and their own
+//! error. Only intervals that may exceed the largest value seen are evaluated again, all quantities together.
 
 use std::cell::OnceCell;
 use std::ops::Range;
@@ -16,99 +16,101 @@ use crate::root::NotConverged;
 use crate::sweep::points::Tolerance;
 use crate::{SolveError, Stop};
 
-/// Quantities of a tooth that have peaks: three forces, three stresses.
+/// Number of quantities of a tooth that have peaks: three forces, three stresses.
 pub(crate) const LOADS: usize = 6;
 
-/// Quantities of all teeth together: wind-up and torsional stiffness with their reciprocals, because their least values are wanted too, and the
-/// reciprocal of the torque that the allowable stress admits, or nothing where there is none.
+/// Number of quantities of all teeth together: wind-up, torsional stiffness and the reciprocals of both, since their
+/// minima are needed too, and the reciprocal of the torque capacity (0 if there is none).
 pub(crate) const TOTALS: usize = 5;
 
 pub(crate) const QUANTITIES: usize = LOADS + TOTALS;
 
-/// Intervals that a piece starts with.
+/// Initial number of intervals of a piece.
 const FIRST_INTERVALS: u32 = 16;
 
-/// Pieces shorter than this part of a lap are looked at from both ends alone.
+/// Pieces shorter than this part of a lap are evaluated at both ends only.
 const SHORTEST_PIECE: f64 = 1e-12;
 
-/// Moments that a curve is judged by.
+/// Number of moments that bound a curve.
 const NODES: usize = 6;
 
-/// Rounds at most: halving alone comes down to the last digit of a fraction in as many.
+/// Largest number of rounds. Bisection alone reaches the last digit of a fraction in as many.
 const MAX_ROUNDS: u32 = 60;
 
-/// What rounding may leave uncertain of a quantity where the rounds are over.
+/// Relative uncertainty that rounding may leave when the rounds are over.
 const OPEN: f64 = 1e-10;
 
-/// How many roundings a bend is of, each as often as [`COARSE_MARGIN`] counts it.
+/// Number of rounding errors in a bend, each counted as often as [`COARSE_MARGIN`].
 const ROUNDINGS: f64 = 1024.0;
 
 /// A tooth that closes within this part of the rotation has no gap.
 const CLOSED: f64 = 1e-12;
 
-/// A stretch that bends by more than this part of a quantity's largest value may hide more than its ends show.
+/// An interval that bends by more than this part of a quantity's largest value may contain more than its ends show.
 const COARSE_BEND: f64 = 1e-2;
 
-/// The same of the capacity alone, whose corners hide each other where they bend both ways; what bends less may be rounding.
+/// The same for the capacity, whose kinks cancel in a bend if they have opposite signs. A smaller bend may be rounding.
 const COARSE_CORNER: f64 = 1e-6;
 
-/// How many times its bend such a stretch is allowed to rise above its ends.
+/// Factor on the bend for the rise of such an interval above its ends.
 const COARSE_MARGIN: f64 = 8.0;
 
-/// The same of any other: a parabola rises by a quarter of it, two lines that meet in a corner by no more than all of it.
+/// Factor for all other intervals: a parabola rises by a quarter of its bend, two lines meeting in a kink by at most
+/// all.
 const MARGIN: f64 = 1.0;
 
 /// Torsional stiffness and its reciprocal.
 const STIFFNESSES: [usize; 2] = [LOADS + 2, LOADS + 3];
 
-/// The reciprocal of the capacity. Where the tooth that is limited changes, or a tooth begins to carry under the limit, its curve has a corner, which no
-/// polynomial knows of: it is judged by its second differences alone.
+/// Reciprocal of the capacity. Its curve has a kink where another tooth becomes limiting, or a tooth begins to carry
+/// under the limit. No polynomial models that, so it is bounded by its second differences alone.
 const CAPACITY: usize = LOADS + TOTALS - 1;
 
-/// How many times its last term a polynomial may be off, the term before it counted for an eighth because one alone may vanish: of a smooth curve, and of
-/// one that begins or ends by a power or a logarithm.
+/// Error of a polynomial in multiples of its last term, for a smooth curve and for one that begins or ends like a power
+/// or a logarithm. The term before the last counts for an eighth, because one term alone may vanish.
 const OFF_SMOOTH: f64 = 4.0;
 const OFF_BY_POWERS: f64 = 32.0;
 const OF_TERM_BEFORE: f64 = 0.125;
 
-/// A stretch beside a change of the teeth that carry, no longer than this part of a lap: there the stiffness runs from one end to the other, for that of
-/// the tooth in question grows from nothing, and under a power law without end at first.
+/// Relative length of a lap below which an interval next to a change of carrying teeth is short. There the stiffness
+/// takes all values between its ends: that of the changing tooth grows from zero, under a power law with infinite
+/// slope.
 const SHORT: f64 = 1e-3;
 
-/// Rounds after which a stretch in doubt is cut into four: what is still in doubt has a corner.
+/// Rounds after which an uncertain interval is cut into four: it then contains a kink.
 const SMOOTH_ROUNDS: u32 = 8;
 
-/// How many of them are then cut in a round, for each quantity: a corner takes some seventeen rounds to be told from what stands beside it.
+/// Number of such intervals cut in a round for each quantity. Isolating a kink takes about 17 rounds.
 const CORNERS_AT_ONCE: usize = 4;
 
-/// Newton's steps to the summit of a polynomial, which need not be exact: it is looked at, and judged again.
+/// Newton steps to the maximum of a polynomial. It need not be exact: it is evaluated and bounded again.
 const SUMMIT_STEPS: u32 = 4;
 
-/// A polynomial that is surer than this part of the largest value says where its summit is; another stretch is cut into four.
+/// If a polynomial's error is below this part of the largest value, its maximum is evaluated. Other intervals are cut.
 const SURE: f64 = 1e-3;
 
-/// Where a stretch is looked at of which no polynomial tells enough; beside an end of a run the nearer to it the denser, for there the slope of a power or a
-/// logarithm may turn within any distance.
+/// Evaluated points of an interval without a usable polynomial. Next to the end of a run they are denser, because there
+/// the slope of a power or a logarithm may change within any distance.
 const QUARTERS: [f64; 3] = [0.25, 0.5, 0.75];
 const TOWARDS_START: [f64; 3] = [1.0 / 64.0, 1.0 / 16.0, 0.25];
 
-/// A stretch of a lap in which no tooth enters; teeth stand at the places from 1 on.
+/// Part of a lap in which no tooth enters. Teeth are at the places from 1 on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Piece {
-    /// Laps before; none where all laps are alike.
+    /// Number of laps before; 0 if all laps are alike.
     pub(crate) lap: u64,
-    /// Shares of the lap that have passed.
+    /// Elapsed shares of the lap.
     pub(crate) start: f64,
     pub(crate) end: f64,
-    /// Places where teeth are listed.
+    /// Number of places where teeth are listed.
     pub(crate) places: u64,
-    /// The tooth that stands where the flank ends, or where it enters, at the start.
+    /// The tooth at the end of the flank, or entering, at the start.
     pub(crate) at_start: Option<AtPlace>,
-    /// The tooth that stands just before the flank at the end.
+    /// The tooth just before the flank at the end.
     pub(crate) at_end: Option<AtPlace>,
 }
 
-/// Where the tooth at a place stands, exactly.
+/// Exact position of the tooth at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct AtPlace {
     pub(crate) place: u64,
@@ -116,7 +118,7 @@ pub(crate) struct AtPlace {
 }
 
 impl Piece {
-    /// Those of a lap.
+    /// Returns the pieces of a lap.
     pub(crate) fn of(loaded: &LoadedDrive<'_>, lap: u64) -> impl Iterator<Item = Self> + use<> {
         let mesh = *loaded.mesh();
         let relieved_fraction =
@@ -133,7 +135,7 @@ impl Piece {
         pieces.flat_map(move |piece| piece.cut_where_a_tooth_comes_to_the_relief(relieved_fraction))
     }
 
-    /// Loads have a corner there, and the ring's stress begins.
+    /// Cuts the piece where a tooth reaches the flank: loads have a kink there, and the ring's stress begins.
     fn cut_where_a_tooth_comes_to_the_flank(self, mesh: &Mesh) -> impl Iterator<Item = Self> + use<> {
         let (place, fraction) = mesh.flank_fraction();
         let limit = *mesh.flank_limit();
@@ -142,12 +144,13 @@ impl Piece {
         self.cut_at(mesh.lists_teeth_before_flank().then_some(fraction), [before, on_flank])
     }
 
-    /// Its gap has a corner there, by a power of one, or grows by a bend from nothing.
+    /// Cuts the piece where a tooth reaches the tip relief. Its gap has a kink there for power 1, otherwise it grows
+    /// smoothly.
     fn cut_where_a_tooth_comes_to_the_relief(self, fraction: Option<f64>) -> impl Iterator<Item = Self> + use<> {
         self.cut_at(fraction, [None, None])
     }
 
-    /// The pieces before and behind a fraction, where it lies within, with the tooth that is known exactly at the end of one and the start of the other.
+    /// Returns the pieces before and after a fraction within, with the exactly known tooth at the cut.
     fn cut_at(
         self,
         fraction: Option<f64>,
@@ -158,37 +161,37 @@ impl Piece {
         std::iter::once(before).chain(cut.map(|start| Self { start, at_start, ..self }))
     }
 
-    /// The position at a place.
+    /// Returns the position at a place.
     pub(crate) fn position(&self, mesh: &Mesh, place: u64, fraction: f64) -> Position {
         self.exactly_at(fraction)
             .find(|at| at.place == place)
             .map_or_else(|| mesh.position_between(place, fraction), |at| at.position)
     }
 
-    /// The teeth whose positions are known exactly.
+    /// Returns the teeth with exactly known positions.
     pub(crate) fn exactly_at(&self, fraction: f64) -> impl Iterator<Item = AtPlace> + use<> {
         let at_start = self.at_start.filter(|_| fraction <= self.start);
         at_start.into_iter().chain(self.at_end.filter(|_| fraction >= self.end))
     }
 }
 
-/// What is seen of a piece.
+/// Evaluated moments of a piece.
 #[derive(Debug)]
 pub(crate) struct Seen {
     pub(crate) piece: Piece,
-    /// Teeth in it, those at one place after another.
+    /// Number of teeth in it, place by place.
     pub(crate) teeth: usize,
-    /// Shares of the lap that have passed, in the order in which they were looked at.
+    /// Elapsed shares of the lap, in order of evaluation.
     pub(crate) fractions: Vec<f64>,
-    /// Of each moment the loads, by quantity and then tooth, and the totals.
+    /// For each moment the loads, by quantity and then tooth, and then the totals.
     values: Vec<f64>,
-    /// Of each moment how far every tooth is pressed, less than nothing where a gap is open; nothing without gaps.
+    /// For each moment the rotation of every tooth beyond closure; negative if a gap is open. Empty without gaps.
     pressed: Vec<f64>,
-    /// The moments in the order of their fractions.
+    /// Indices of the moments in order of their fractions.
     order: Vec<usize>,
-    /// Of each moment, whether the stretch up to the next one hides nothing any more.
+    /// For each moment, true if the interval up to the next one needs no further evaluation.
     is_settled: Vec<bool>,
-    /// Where to look next.
+    /// Fractions to evaluate next.
     wanted: Vec<f64>,
 }
 
@@ -214,7 +217,7 @@ impl Seen {
         LOADS * self.teeth + TOTALS
     }
 
-    /// Room for the values of one more moment.
+    /// Appends a moment and returns its values, to be filled in.
     pub(crate) fn push(&mut self, fraction: f64) -> &mut [f64] {
         self.fractions.push(fraction);
         self.is_settled.push(false);
@@ -223,22 +226,22 @@ impl Seen {
         &mut self.values[start..]
     }
 
-    /// How far the teeth of the moment pushed last are pressed.
+    /// Appends the rotation beyond closure of the teeth of the last moment.
     pub(crate) fn push_pressed(&mut self, pressed: impl Iterator<Item = f64>) {
         self.pressed.extend(pressed);
     }
 
-    /// The values of a moment.
+    /// Returns the values of a moment.
     pub(crate) fn values(&self, moment: usize) -> &[f64] {
         &self.values[moment * self.stride()..][..self.stride()]
     }
 
-    /// A load of a tooth at a moment.
+    /// Returns a load of a tooth at a moment.
     pub(crate) fn load(&self, moment: usize, quantity: usize, tooth: usize) -> f64 {
         self.values(moment)[quantity * self.teeth + tooth]
     }
 
-    /// Where the curves of a quantity stand among a moment's values: one for each tooth, of a total one.
+    /// Returns the range of a quantity's curves among a moment's values: one for each tooth, one for a total.
     const fn curves(&self, quantity: usize) -> Range<usize> {
         if quantity < LOADS {
             quantity * self.teeth..(quantity + 1) * self.teeth
@@ -256,14 +259,14 @@ impl Seen {
         &self.pressed[moment * self.teeth..][..self.teeth]
     }
 
-    /// The first tooth that carries at one of two moments alone.
+    /// Returns the first tooth that carries at only one of two moments.
     fn tooth_changed(&self, one: usize, other: usize) -> Option<usize> {
         if self.pressed.is_empty() {
             return None;
         }
         let (one_rad, other_rad) = (self.rotation_rad(one), self.rotation_rad(other));
         self.pressed(one).iter().zip(self.pressed(other)).position(|(&one, &other)| {
-            // A tooth without an arm is closed by no rotation, as it is beside that place if it has a gap; one that has none carries there.
+            // No rotation closes the gap of a tooth without a lever arm. A tooth there without a gap carries.
             let has_gap = |pressed: f64, rotation_rad: f64| rotation_rad - pressed > CLOSED * rotation_rad;
             (one > 0.0) != (other > 0.0)
                 && (one.is_finite() || has_gap(other, other_rad))
@@ -271,8 +274,9 @@ impl Seen {
         })
     }
 
-    /// Where some tooth may carry, or not, between two moments that follow each other, at which it does not, or does: lines through the moments on either side, extended, meet
-    /// beyond nothing, and a curve that is bent towards nothing stays on this side of both.
+    /// Returns a fraction between two successive moments at which some tooth may carry although it is open at both, or
+    /// may be open although it carries at both. The lines through the neighbouring moments, extended, then meet beyond
+    /// zero. A curve that bends towards zero stays on this side of both lines.
     fn suspected_change(&self, at: usize) -> Option<f64> {
         let moments = [at.checked_sub(1), Some(at), Some(at + 1), Some(at + 2)];
         let [before, one, other, after] = moments.map(|at| self.order.get(at?).copied());
@@ -283,12 +287,12 @@ impl Seen {
         };
         let nothing = CLOSED * self.rotation_rad(one);
         let meeting = |tooth: usize| {
-            // As if it did not carry: a curve below nothing.
+            // Treat it as not carrying: a curve below zero.
             let sign = if self.pressed(one)[tooth] > 0.0 { -1.0 } else { 1.0 };
             let [start, end] = [one, other].map(|moment| sign * self.pressed(moment)[tooth]);
             let own = (end - start) / (high - low);
             let beside = |from: Option<usize>, to: Option<usize>| Some(sign * slope(from?, to?, tooth));
-            // Where a piece ends, the curve goes on to bend as on the side that is seen.
+            // At the end of a piece, the curve is assumed to bend as on the known side.
             let (rise, fall) = match (beside(before, Some(one)), beside(Some(other), after)) {
                 (Some(rise), Some(fall)) => (rise, fall),
                 (Some(rise), None) => (rise, 2.0 * own - rise),
@@ -308,7 +312,7 @@ impl Seen {
         self.value(moment, LOADS * self.teeth)
     }
 
-    /// Sorts in the moments that are new.
+    /// Sorts the new moments into the order.
     fn put_in_order(&mut self) {
         let fractions = &self.fractions;
         self.order.extend(self.order.len()..fractions.len());
@@ -316,21 +320,22 @@ impl Seen {
     }
 }
 
-/// Whoever works out moments.
+/// Evaluates moments.
 pub(crate) trait Look {
-    /// Whether teeth begin and cease to carry between their entry and their exit.
+    /// Returns true if teeth begin and cease to carry between their entry and their exit.
     fn has_gaps(&self) -> bool;
 
-    /// Whether forces are in proportion to what teeth are pressed by: then every curve is smooth up to its ends.
+    /// Returns true if forces are proportional to the teeth's displacements. Every curve is then smooth up to its ends.
     fn is_linear(&self) -> bool;
 
-    /// Whether the stiffness is in proportion to the rotation's reciprocal, and so has its extremes with it.
+    /// Returns true if the stiffness is proportional to the reciprocal of the rotation, so that they share their
+    /// extremes.
     fn is_in_proportion(&self) -> bool;
 
-    /// `M0` in N·mm.
+    /// Returns `M0` in N·mm.
     fn input_torque_nmm(&self) -> f64;
 
-    /// A rotation whose rounding is that of what teeth keep from a corner, where they are pressed against it.
+    /// Returns a rotation that has the rounding error of a tooth's gap at a corner, if teeth press against corners.
     ///
     /// # Errors
     /// [`NotConverged`] from the path.
@@ -338,28 +343,28 @@ pub(crate) trait Look {
         Ok(0.0)
     }
 
-    /// How many teeth are told apart at each place.
+    /// Returns the number of teeth that are distinguished at each place.
     fn teeth_at_each_place(&self) -> u64;
 
-    /// Appends moments of a piece; false where this way cannot tell.
+    /// Appends moments of a piece. Returns false if this method does not support the drive.
     ///
     /// # Errors
-    /// Why there is no answer.
+    /// The reason why there is no answer.
     fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError>;
 }
 
-/// The largest value of a quantity.
+/// Largest value of a quantity.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Best {
     pub(crate) value: f64,
-    /// Which of the pieces, and which of its moments.
+    /// Index of the piece, and of its moment.
     pub(crate) piece: usize,
     pub(crate) moment: usize,
-    /// Of a load.
+    /// Index of the tooth, for a load.
     pub(crate) tooth: usize,
 }
 
-/// What was found.
+/// Result of the search.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
     pub(crate) seen: Vec<Seen>,
@@ -368,7 +373,7 @@ pub(crate) struct Found {
 
 struct Search {
     tolerance: Tolerance,
-    /// How true straight lines between the moments have to be, over the largest values; nothing where only these are wanted.
+    /// Largest error of linear interpolation between the moments, over the peaks. None if only the peaks are needed.
     lines: Option<f64>,
     is_sought: [bool; QUANTITIES],
     seen: Vec<Seen>,
@@ -376,10 +381,11 @@ struct Search {
     states: u64,
 }
 
-/// Looks for the largest value of every quantity; nothing where this way of looking cannot tell.
+/// Searches for the largest value of every quantity. Returns none if this evaluation method does not support the drive.
 ///
 /// # Errors
-/// Those of looking; [`SolveError::TooManyStates`] beyond the tolerance's limit, [`SolveError::Stopped`] if told to stop.
+/// Errors of the evaluation; [`SolveError::TooManyStates`] beyond the tolerance's limit, [`SolveError::Stopped`] if
+/// stopped.
 pub(crate) fn search(
     look: &mut impl Look,
     pieces: impl Iterator<Item = Piece>,
@@ -393,7 +399,7 @@ pub(crate) fn search(
         STIFFNESSES.iter().for_each(|&quantity| is_sought[quantity] = false);
     }
     let (mut seen, mut states) = (Vec::new(), 0_u64);
-    // Each is looked at: where slots and spaces are unlike there may be millions of laps, more than memory has room for.
+    // Pieces are evaluated one by one: deviating items may need millions of laps, more than fit in memory.
     for piece in pieces {
         let of_piece = Seen::new(piece, teeth(&piece));
         states = states.saturating_add((of_piece.wanted.len() * of_piece.teeth) as u64);
@@ -417,7 +423,7 @@ pub(crate) fn search(
             return Ok(Some(Found { seen: search.seen, best: search.best }));
         }
     }
-    // What is left is more than rounding only where curves are no curves.
+    // The remaining excess is more than rounding only if the curves are not smooth.
     let rounding = search.rounding(look.input_torque_nmm(), look.distance_at_corner_rad()?);
     if excess > tolerance.relative().max(OPEN).max(rounding) {
         return Err(NotConverged { what: "extremes of a sweep", iterations: MAX_ROUNDS, bracket_width: excess }.into());
@@ -426,15 +432,16 @@ pub(crate) fn search(
 }
 
 impl Search {
-    /// What rounding of closing angles may make of the loads, and of a bend that is counted several times: amplified by `Δφ K/M`, M what is given or
-    /// what is allowed, and Δφ what teeth are from the axis where they are pressed against a corner.
+    /// Returns the effect of rounding of closing angles on the loads, including a bend counted several times. The
+    /// amplification is `Δφ K/M`, with M the given or the allowed torque. If teeth press against corners, Δφ is at
+    /// least [`Look::distance_at_corner_rad`].
     fn rounding(&self, input_torque_nmm: f64, distance_at_corner_rad: f64) -> f64 {
         let [rotation_rad, stiffness_nmm_per_rad] = [LOADS, STIFFNESSES[0]].map(|quantity| self.best[quantity].value);
         let per_torque = self.best[CAPACITY].value.max(1.0 / input_torque_nmm);
         ROUNDINGS * f64::EPSILON * (rotation_rad.max(distance_at_corner_rad) * stiffness_nmm_per_rad * per_torque)
     }
 
-    /// Looks where it is wanted.
+    /// Evaluates the wanted moments.
     fn look(&mut self, look: &mut impl Look) -> Result<bool, SolveError> {
         for (piece, seen) in self.seen.iter_mut().enumerate() {
             let wanted = std::mem::take(&mut seen.wanted);
@@ -466,7 +473,7 @@ impl Search {
         Ok(true)
     }
 
-    /// Notes where to look next; what a quantity may still rise by, relative.
+    /// Records the fractions to evaluate next. Returns the relative amount by which a quantity may still rise.
     fn want(&mut self, round: u32, has_gaps: bool, is_linear: bool) -> f64 {
         let relative = self.tolerance.relative();
         let nearest = (1e-3 * relative).max(16.0 * f64::EPSILON);
@@ -492,11 +499,11 @@ impl Search {
     }
 }
 
-/// What is wanted of the stretches between moments.
+/// Criteria for the intervals between moments.
 struct Judge {
     best: [f64; QUANTITIES],
     relative: f64,
-    /// Stretches as short as this part of a lap hide nothing.
+    /// Intervals shorter than this part of a lap need no evaluation.
     nearest: f64,
     is_late: bool,
     is_linear: bool,
@@ -505,8 +512,8 @@ struct Judge {
 }
 
 impl Judge {
-    /// Closes in on the instants at which the teeth that carry change: on the first tooth of each, by the line through the two moments beside
-    /// it on one side, on which it carries, or does not, throughout.
+    /// Narrows the intervals in which the set of carrying teeth changes. For the first tooth that changes, it
+    /// extrapolates the line through the two moments on one side.
     fn close_in_on_changes(&self, seen: &mut Seen, round: u32) {
         for at in 1..seen.order.len() {
             let (one, other) = (seen.order[at - 1], seen.order[at]);
@@ -533,7 +540,7 @@ impl Judge {
             let by_side = if is_low_nearer { before.or(after) } else { after.or(before) };
             let root = by_side.unwrap_or_else(|| by_line(pressed(one), pressed(other)));
             let root = Some(root).filter(|root| root.is_finite());
-            // Every third time halves, and at last every time, so that no corner keeps the lines from it.
+            // Every third round bisects, and finally every round, so that no kink prevents convergence.
             let halves = self.is_late || round % 3 == 2 || root.is_none();
             seen.wanted.extend(halves.then_some(0.5 * (low + high)));
             let step = (0.25 * self.nearest).min(0.25 * (high - low));
@@ -542,7 +549,7 @@ impl Judge {
         }
     }
 
-    /// Whether two moments beside a change are far enough apart for a value between them to matter.
+    /// Returns true if two moments at a change are far enough apart for a value between them to matter.
     fn change_matters(&self, seen: &Seen, one: usize, other: usize) -> bool {
         let width = seen.fractions[other] - seen.fractions[one];
         if width <= 16.0 * f64::EPSILON {
@@ -562,7 +569,7 @@ impl Judge {
         })
     }
 
-    /// Notes where a piece is to be looked at; what a quantity may still rise by, relative.
+    /// Records the fractions of a piece to evaluate. Returns the relative amount by which a quantity may still rise.
     fn want(&self, seen: &mut Seen) -> f64 {
         let mut candidates: [Vec<Candidate>; QUANTITIES] = Default::default();
         let (mut wanted, mut settled) = (std::mem::take(&mut seen.wanted), Vec::new());
@@ -590,7 +597,7 @@ impl Judge {
         most
     }
 
-    /// The stretches of a run, each against what was seen so far.
+    /// Judges the intervals of a run against the peaks so far.
     fn judge(
         &self,
         run: &Run<'_>,
@@ -604,7 +611,7 @@ impl Judge {
             return;
         }
         if count < NODES {
-            // Too few to be judged by.
+            // Too few moments for a bound.
             let cuts: &[f64] = if count < 3 { &[0.25, 0.5, 0.75] } else { &[0.5] };
             for [low, high] in (1..count).map(|at| [run.fraction(at - 1), run.fraction(at)]) {
                 if high - low > self.nearest {
@@ -680,20 +687,20 @@ impl Judge {
     }
 }
 
-/// What a quantity may still rise to on a stretch.
+/// Upper bound of a quantity on an interval.
 #[derive(Clone, Copy)]
 struct Candidate {
     bound: f64,
-    /// Where to look, from 0 to 1 along the stretch.
+    /// Points to evaluate, from 0 to 1 along the interval.
     cuts: [f64; 3],
     ends: [f64; 2],
 }
 
-/// Moments one after another at which the same teeth carry.
+/// Successive moments at which the same teeth carry.
 struct Run<'a> {
     seen: &'a Seen,
     moments: &'a [usize],
-    /// Whether the piece begins or ends with it, and not a change of these teeth.
+    /// True if the piece, and not a change of these teeth, bounds the run at its start or its end.
     is_first: bool,
     is_last: bool,
 }
@@ -704,16 +711,17 @@ impl Run<'_> {
     }
 }
 
-/// The second differences at both ends of a stretch, from the moments beside it; at an end of the run both are of the moment next to it.
+/// Second differences at both ends of an interval, from the neighbouring moments. At an end of the run both are those
+/// of the moment next to it.
 struct Bends<'a> {
     ends: [&'a [f64]; 2],
     beside: [[&'a [f64]; 3]; 2],
-    /// Of three moments, that make of their values the bend of this stretch.
+    /// Weights of three moments that give the bend of this interval.
     weights: [[f64; 3]; 2],
 }
 
 impl<'a> Bends<'a> {
-    /// Of a run of three moments or more.
+    /// Returns the bends in a run of three moments or more.
     fn new(run: &Run<'a>, at: usize) -> Self {
         let last = run.moments.len() - 3;
         let starts = [at.saturating_sub(1).min(last), at.min(last)];
@@ -721,7 +729,8 @@ impl<'a> Bends<'a> {
         let is_at_end = at == 0 || at == last + 1;
         let weights = starts.map(|start| {
             let [x, y, z] = [0, 1, 2].map(|step| run.fraction(start + step));
-            // Of a smooth curve by its curvature, of two lines by what their slopes differ by, of which one end tells a part alone.
+            // By curvature for smooth curves. For two lines by the difference of slopes, of which one end shows only a
+            // part.
             let scale = (width * width / (z - x)).max(if is_at_end { width } else { 0.5 * width });
             let (before, after) = (scale / (y - x), scale / (z - y));
             [before, -(before + after), after]
@@ -734,7 +743,8 @@ impl<'a> Bends<'a> {
         }
     }
 
-    /// How much each curve bends, where a parabola rises above its ends by a quarter of that, and what it may rise to. `coarse` is given by curve.
+    /// Computes the bend of each curve, a quarter of which is the rise of a parabola, and its bound. `coarse` is by
+    /// curve.
     fn margins(&self, coarse: &[f64], bends: &mut [f64], bounds: &mut [f64]) {
         let count = coarse.len();
         let [[a, b, c], [d, e, f]] = self.weights;
@@ -753,28 +763,30 @@ impl<'a> Bends<'a> {
     }
 }
 
-/// Moments that a curve is judged by on a stretch, counted in its length: its ends at 0 and 1, and those beside it from the nearest on.
+/// Moments that bound a curve on an interval, in units of its length. Its ends are at 0 and 1; the others follow by
+/// distance.
 struct Nodes {
     moments: [usize; NODES],
     places: [f64; NODES],
-    /// Of the distance of each node from the one so many before it.
+    /// Reciprocals of the distance of each node from the one this many before it.
     reciprocals: [[f64; NODES]; NODES],
 }
 
-/// The highest place of a curve on a stretch, by the polynomial through its nodes.
+/// Maximum of a curve on an interval, by the polynomial through its nodes.
 struct Summit {
-    /// How high it is.
+    /// Value.
     top: f64,
-    /// Where it is, from 0 to 1.
+    /// Place, from 0 to 1.
     at: f64,
-    /// How far the polynomial may be off.
+    /// Error estimate of the polynomial.
     error: f64,
-    /// What the curve does not rise above.
+    /// Upper bound of the curve.
     bound: f64,
 }
 
 impl Nodes {
-    /// Those of a run; nothing where there are too few. Nodes nearer to each other than a quarter of the stretch would only show rounding.
+    /// Returns the nodes of a run; none if there are too few. Nodes closer than a quarter of the interval only show
+    /// rounding.
     fn of(run: &Run<'_>, at: usize) -> Option<Self> {
         const APART: f64 = 0.25;
         let origin = run.fraction(at);
@@ -811,7 +823,7 @@ impl Nodes {
         Some(nodes)
     }
 
-    /// Of a curve off which the polynomial may be so many times its last term.
+    /// Returns the maximum of a curve whose polynomial may be off by this multiple of its last term.
     fn summit(&self, seen: &Seen, curve: usize, off: f64) -> Summit {
         let u = &self.places;
         let values = self.moments.map(|moment| seen.value(moment, curve));
@@ -822,11 +834,11 @@ impl Nodes {
                 c[node] = (c[node] - c[node - 1]) * self.reciprocals[order][node];
             }
         }
-        // What the last two terms come to in the middle.
+        // The last two terms in the middle.
         let fourth = c[4].abs() * 0.25 * ((0.5 - u[2]) * (0.5 - u[3])).abs();
         let fifth = c[5].abs() * 0.25 * ((0.5 - u[2]) * (0.5 - u[3]) * (0.5 - u[4])).abs();
         let error = off * fifth.max(OF_TERM_BEFORE * fourth);
-        // In powers of the place.
+        // Coefficients of powers of the place.
         let mut a = [0.0; NODES];
         a[0] = c[NODES - 1];
         for node in (0..NODES - 1).rev() {
@@ -839,7 +851,7 @@ impl Nodes {
         let slope = |x: f64| a[1] + x * (2.0 * a[2] + x * (3.0 * a[3] + x * (4.0 * a[4] + x * 5.0 * a[5])));
         let bend = |x: f64| 2.0 * a[2] + x * (6.0 * a[3] + x * (12.0 * a[4] + x * 20.0 * a[5]));
         let higher = values[0].max(values[1]);
-        // What the error may make of the slope: nodes stand a quarter apart at least.
+        // Effect of the error on the slope: nodes are at least a quarter apart.
         let slope_error = 8.0 * error;
         let slopes = [0.0, 0.5, 1.0].map(slope);
         let is_steep =
@@ -858,14 +870,14 @@ impl Nodes {
                     high = at
                 }
                 let newton = at - found / bend(at);
-                // Where it has arrived it stands on an end.
+                // After convergence it is at an end.
                 at = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
             }
             top = higher.max(value(at));
             from_end = at.min(1.0 - at);
         }
-        // At its nodes the polynomial is right: a slope that is off by so much makes it wrong at the summit by no more than the way from the nearer
-        // end, and moves the summit of a curve that is bent downwards throughout by so little.
+        // At its nodes the polynomial is exact. An error of the slope changes the maximum by at most the error times
+        // the distance from the nearer end. It shifts the maximum of a concave curve only slightly.
         let least_bend = [0.0, 0.5, 1.0].map(|x| -bend(x)).into_iter().fold(f64::INFINITY, f64::min);
         let above =
             if least_bend > 0.0 { error.min(slope_error * (0.5 * slope_error / least_bend + from_end)) } else { error };
@@ -879,7 +891,7 @@ mod tests {
     use crate::Drive;
     use crate::sweep::tried::PAPER_5_1;
 
-    /// A lap of sixteen intervals of one tooth, each moment put down by such a function.
+    /// Returns a lap of sixteen intervals with one tooth, each moment filled in by the function.
     fn seen_by(put_down: impl Fn(&mut Seen, f64)) -> Seen {
         let piece = Piece { lap: 0, start: 0.0, end: 1.0, places: 1, at_start: None, at_end: None };
         let mut seen = Seen::new(piece, 1);
@@ -890,12 +902,13 @@ mod tests {
         seen
     }
 
-    /// A curve as the first load of the tooth.
+    /// Returns a curve as the first load of the tooth.
     fn seen_of(curve: impl Fn(f64) -> f64) -> Seen {
         seen_by(|seen, fraction| seen.push(fraction)[0] = curve(fraction))
     }
 
-    /// That on every stretch what the curve is said to stay below is not below its largest value there; how far it is above at most.
+    /// Asserts that on every interval the bound is not below the curve's maximum. Returns the largest excess of the
+    /// bound.
     fn assert_bounded(curve: impl Fn(f64) -> f64, off: Option<f64>) -> f64 {
         let seen = seen_of(&curve);
         let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
@@ -918,7 +931,7 @@ mod tests {
     }
 
     #[test]
-    fn smooth_curves_stay_below_their_bounds_which_are_near() {
+    fn smooth_curves_stay_below_close_bounds() {
         for step in 0..50 {
             let summit = f64::from(step) * 0.02;
             let above = assert_bounded(|x| 1.0 + (1.5 * (x - summit)).cos(), Some(OFF_SMOOTH));
@@ -927,7 +940,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_that_begin_with_a_power_stay_below_their_bounds() {
+    fn curves_starting_with_power_stay_below_bounds() {
         for step in 0..50 {
             let summit = f64::from(step) * 0.002;
             for power in [2.11, 2.5] {
@@ -937,7 +950,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_with_a_corner_anywhere_stay_below_their_bounds() {
+    fn curves_with_corner_stay_below_bounds() {
         for step in 0..400 {
             let corner = f64::from(step) * 0.002_47;
             for (before, after) in [(1.0, 1.0), (0.1, 3.0), (2.0, 0.2)] {
@@ -946,9 +959,10 @@ mod tests {
         }
     }
 
-    /// What the polynomials through the first four, five and six of the nodes differ by in the middle, as Lagrange has them.
+    /// Error estimate from the polynomials through the first four, five and six nodes, in Lagrange's form, in the
+    /// middle.
     #[test]
-    fn a_polynomial_may_be_off_by_what_its_last_terms_come_to_in_the_middle() {
+    fn polynomial_error_follows_from_last_lagrange_terms() {
         let curve = |x: f64| (40.0 * x).sin() + (7.0 * x).exp();
         let seen = seen_of(curve);
         let run = Run { seen: &seen, moments: &seen.order, is_first: true, is_last: true };
@@ -970,7 +984,7 @@ mod tests {
         }
     }
 
-    /// A tooth that is pressed, or not, by such a curve.
+    /// Returns a tooth whose rotation beyond closure is the given curve.
     fn seen_of_a_tooth(pressed: impl Fn(f64) -> f64) -> Seen {
         seen_by(|seen, fraction| {
             seen.push(fraction)[LOADS] = 2.0;
@@ -979,7 +993,7 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_is_cut_where_a_tooth_stands_at_the_start_of_the_relief() {
+    fn splits_piece_where_tooth_reaches_relief_start() {
         let mesh = Mesh::new(&Drive::new(&PAPER_5_1).expect("a possible drive"));
         let whole = Piece { lap: 0, start: 0.0, end: 1.0, places: 7, at_start: None, at_end: None };
         for start_deg in [1.0, 13.4, 20.0, 31.0, 50.0, 89.0] {
@@ -994,9 +1008,9 @@ mod tests {
         }
     }
 
-    /// The secants on either side of an interval of a parabola meet in its middle.
+    /// The secants on both sides of a parabola's interval meet in its middle.
     #[test]
-    fn a_tooth_that_carries_or_does_not_between_two_moments_alone_is_suspected_halfway() {
+    fn suspects_change_between_moments_at_interval_middle() {
         let judge = Judge {
             best: [1.0; QUANTITIES],
             relative: 1e-6,
@@ -1008,7 +1022,7 @@ mod tests {
         };
         for step in 0..1000 {
             let (summit, sign) = (0.001 * f64::from(step), if step % 2 == 0 { 1.0 } else { -1.0 });
-            // It stands above nothing over a half of an interval.
+            // It is above zero over half of an interval.
             let half = 0.25 / 16.0;
             let mut seen = seen_of_a_tooth(|x| sign * (half * half - (x - summit) * (x - summit)));
             let beside = (1..17).find(|&at| seen.fractions[at] > summit).unwrap_or(16);
@@ -1024,7 +1038,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tooth_that_stays_well_on_one_side_of_nothing_is_not_suspected() {
+    fn does_not_suspect_tooth_far_from_zero() {
         for step in 0..100 {
             let phase = 0.07 * f64::from(step);
             for sign in [1.0, -1.0] {
@@ -1035,7 +1049,7 @@ mod tests {
     }
 
     #[test]
-    fn the_summit_of_a_polynomial_is_found_wherever_it_stands() {
+    fn finds_maximum_of_polynomial_at_any_position() {
         for step in 1..200 {
             let summit = f64::from(step) * 0.005;
             let seen = seen_of(|x| 3.0 - (x - summit) * (x - summit));

@@ -1,4 +1,4 @@
-//! A drive that the tests beside the sweep's code try.
+//! Drive for the unit tests of the sweep.
 
 use crate::{DriveParameters, ToothShape, WaveGenerator};
 

@@ -1,5 +1,5 @@
-//! How far the wave generator turns before the first tooth has closed its gaps: the wind-up without load (docs/theory.md section 4.8), and where it is
-//! least and largest (section 9).
+//! Wind-up without load: the rotation of the wave generator until the first tooth has closed its gaps
+//! (docs/explanation/theory.md section 4.8), and the search for its extremes (section 9).
 
 use std::ops::Range;
 
@@ -13,12 +13,12 @@ use crate::sweep::points::Tolerance;
 use crate::sweep::search::{LOADS, Look, Piece, Seen, TOTALS, search};
 use crate::{SolveError, Stop};
 
-/// What of a lap is left out at either end of a piece, over the tolerance, and at least.
+/// Excluded length of a lap at either end of a piece, in units of the tolerance, and its minimum.
 const MARGIN: f64 = 1e-3;
 const LEAST_MARGIN: f64 = 1e-12;
 
-/// `Δφ_0 = min θ_i` at each input angle of a sweep of this drive under this load with these deviations: the wind-up as the torque goes to
-/// nothing. Without gaps there is none.
+/// Returns `Δφ_0 = min θ_i` at each input angle of a sweep of this drive, load and deviations. It is the limit of the
+/// wind-up as the torque goes to zero, and 0 without gaps.
 ///
 /// # Errors
 /// As the sweep itself.
@@ -36,7 +36,7 @@ pub fn unloaded_wind_up_deg(
         let (input_angle_deg, position_deg) = (states.input_angle_deg[state], states.position_deg[state]);
         let lobe = states.lobe.get(state).copied().unwrap_or_default();
         let place = sweep.mesh.place_at(input_angle_deg, lobe, position_deg);
-        // Near the valley the place in degrees has lost digits, but there a tooth closes last of all.
+        // Near the valley the position in degrees has lost digits, but there a tooth closes last of all.
         let position = Position::from_lobe(position_deg.to_radians().min(half_rad), lobes);
         Ok::<_, SolveError>(loaded.tooth_at(&place, position)?.spring.closing_rad)
     };
@@ -54,7 +54,8 @@ pub fn unloaded_wind_up_deg(
     Ok(wind_up_deg)
 }
 
-/// The states of each input angle. Where loads jump an angle stands twice; by number the teeth then start anew.
+/// Returns the ranges of states of each input angle. At a jump of the loads an angle occurs twice; tooth numbers
+/// restart.
 fn by_input_angle(states: &States) -> impl Iterator<Item = Range<usize>> {
     let mut start = 0;
     (1..=states.len()).filter_map(move |next| {
@@ -65,8 +66,8 @@ fn by_input_angle(states: &States) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// The pieces and fractions at which the wind-up without load is least and largest. Beside their ends, which are looked at anyway: a tooth on the lobe or in the
-/// valley closes no gap, and one that stands next to it may.
+/// Returns the pieces and fractions with the least and the largest wind-up without load. The ends of pieces are
+/// excluded, as they are evaluated anyway: a tooth on the lobe or in the valley closes no gap, but one next to it may.
 ///
 /// # Errors
 /// As [`search()`].
@@ -92,45 +93,47 @@ pub(crate) fn extremes(
     if first_rad > 0.0 {
         look.scale_rad = first_rad;
     }
-    // This way tells of every moment.
+    // This method covers every moment.
     let found = search(&mut look, pieces.into_iter(), tolerance, None, stop)?.unwrap_or_default();
     let sought = [EARLINESS, FIRST].map(|quantity| found.best[quantity]).into_iter();
-    // Where no gap is open there is no largest.
+    // If no gap is open, there is no largest value.
     let sought = sought.filter(|best| best.value > 0.0);
     Ok(sought.map(|best| (found.seen[best.piece].piece, found.seen[best.piece].fractions[best.moment])).collect())
 }
 
-/// Of each tooth how early it closes: a smooth curve, which is largest where the wind-up is least. It stands where a load does.
+/// Index of the quantity "how early a tooth closes": a smooth curve with its maximum at the least wind-up. It uses a
+/// load's index.
 const EARLINESS: usize = 0;
 
-/// The least of the closing angles: a curve with corners where another tooth becomes the first. It stands where the capacity does, which has them too.
+/// Index of the least closing angle: a curve with kinks where another tooth becomes the first. It uses the index of the
+/// capacity, which has kinks too.
 const FIRST: usize = LOADS + TOTALS - 1;
 
-/// Moments of the teeth without load.
+/// Moments of the unloaded teeth.
 struct UnloadedLook<'a> {
     teeth: PlainLook<'a>,
-    /// A closing angle to compare with.
+    /// Reference closing angle.
     scale_rad: f64,
 }
 
 impl UnloadedLook<'_> {
-    /// The closing angles of a piece, place by place.
+    /// Returns the closing angles of a piece, place by place.
     fn closing_rad(&self, piece: &Piece, fraction: f64) -> Result<Vec<f64>, SolveError> {
         let lost_motion_rad = self.teeth.loaded().lost_motion_rad();
         let teeth = self.teeth.teeth(piece, fraction)?;
-        // A gap that lost motion makes up for may be closed to the last digits.
+        // A gap that is taken up by lost motion may be closed up to rounding.
         Ok(teeth.iter().map(|tooth| (lost_motion_rad + tooth.spring.closing_rad).max(0.0)).collect())
     }
 }
 
 impl Look for UnloadedLook<'_> {
     fn has_gaps(&self) -> bool {
-        // No curve changes with the teeth that carry.
+        // The curves do not depend on the set of carrying teeth.
         false
     }
 
     fn is_linear(&self) -> bool {
-        // None leaves nothing by a power.
+        // No curve ends like a power.
         true
     }
 

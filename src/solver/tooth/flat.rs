@@ -1,8 +1,8 @@
-//! The flat of a flat-sided tooth on the wall of its slot (docs/theory.md sections 4.3 and 5).
+//! Contact of the flat of a flat-sided tooth with the wall of its slot (docs/explanation/theory.md sections 4.3 and 5).
 
 use std::f64::consts::PI;
 
-/// The rectangle over which a flat is borne.
+/// Rectangle of contact of a flat.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlatContact {
     length_mm: f64,
@@ -10,31 +10,32 @@ pub struct FlatContact {
 }
 
 impl FlatContact {
-    /// Of a length along the slot and a width along the axis, both positive.
+    /// Builds the contact from a length along the slot and a width along the axis, both positive.
     pub const fn new(length_mm: f64, width_mm: f64) -> Self {
         Self { length_mm, width_mm }
     }
 
-    /// Its length along the slot.
+    /// Returns its length along the slot.
     pub const fn length_mm(&self) -> f64 {
         self.length_mm
     }
 
-    /// The mean pressure under a force. Its edges, where the pressure is higher, are not modelled.
+    /// Returns the mean pressure under a force. The higher pressure at the edges is not modelled.
     pub fn stress_mpa(&self, force_n: f64) -> f64 {
         force_n / (self.length_mm * self.width_mm)
     }
 
-    /// The force that makes the mean pressure `stress_mpa`.
+    /// Returns the force that makes the mean pressure `stress_mpa`.
     pub fn force_n(&self, stress_mpa: f64) -> f64 {
         stress_mpa * (self.length_mm * self.width_mm)
     }
 
-    /// The mean approach of the rectangle, evenly pressed, on half-spaces under 1 N: `I/(π E* (l L)²)` with
-    /// `I = (2/3)(3l²L asinh(L/l) + 3lL² asinh(l/L) + l³ + L³ - (l² + L²)^(3/2))`.
+    /// Returns the mean approach of two half-spaces under uniform pressure on the rectangle, for 1 N: `I/(π E* (l L)²)`
+    /// with `I = (2/3)(3l²L asinh(L/l) + 3lL² asinh(l/L) + l³ + L³ - (l² + L²)^(3/2))`.
     pub fn compliance_mm_per_n(&self, modulus_mpa: f64) -> f64 {
         let (long, short) = (self.length_mm.max(self.width_mm), self.length_mm.min(self.width_mm));
-        // Over the cube of the long side, with t = short/long: 1 + t³ - (1 + t²)^(3/2) without the difference of near numbers.
+        // Over the cube of the long side, with t = short/long: 1 + t³ - (1 + t²)^(3/2) without a difference of nearly
+        // equal numbers.
         let t = short / long;
         let squared = t * t;
         let root = (1.0 + squared).sqrt();

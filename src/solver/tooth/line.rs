@@ -1,27 +1,28 @@
-//! Line contact: Hertz pressure, and the approach of a cylinder between two bodies (docs/theory.md sections 4.3 and 5).
+//! Line contact: Hertz pressure, and the approach of a cylinder between two bodies (docs/explanation/theory.md sections
+//! 4.3 and 5).
 
 use std::f64::consts::{LN_2, PI};
 
 use crate::contact::{Contact, Materials, PerContact};
 
-/// Half the width of a line contact over the lesser of tooth radius and depth, from which on Johnson's law deserves a word.
+/// Half-width of a line contact over the lesser of tooth radius and depth, above which Johnson's law gets a finding.
 pub(crate) const WIDE_SHARE: f64 = 0.1;
 
-/// The same from which on the law has no meaning.
+/// The same ratio at which Johnson's law ends.
 pub(crate) const WIDEST_SHARE: f64 = 0.5;
 
-/// `δ = F (A + B ln(F_r/F))` at one contact, with `F_r` the force under which half the contact's width is `length_mm`.
+/// Johnson's `δ = F (A + B ln(F_r/F))` at one contact. At the force `F_r` half the contact's width is `length_mm`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct JohnsonLine {
     /// `A`.
     pub(crate) compliance_mm_per_n: f64,
     /// `B`.
     pub(crate) growth_mm_per_n: f64,
-    /// The length that the half-width stays below.
+    /// Upper bound of the half-width.
     pub(crate) length_mm: f64,
 }
 
-/// The numbers of [`JohnsonLine`] at a place.
+/// Coefficients of [`JohnsonLine`] at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct JohnsonAt {
     /// `A`.
@@ -32,16 +33,17 @@ pub(crate) struct JohnsonAt {
     pub(crate) reference_n: f64,
 }
 
-/// The lengths over which Johnson's law counts the approach: the tooth's radius and the depth of the other body, by default the same.
+/// Returns the reference length of Johnson's law: the lesser of the tooth's radius and the other body's depth, by
+/// default equal.
 pub(crate) fn least_length_mm(depth_mm: &PerContact<Option<f64>>, contact: Contact, tooth_radius_mm: f64) -> f64 {
     depth_mm.get(contact).map_or(tooth_radius_mm, |depth_mm| depth_mm.min(tooth_radius_mm))
 }
 
 impl JohnsonLine {
-    /// Of a contact that gives way in another way.
+    /// Coefficients of a contact with another law.
     pub(crate) const NONE: Self = Self { compliance_mm_per_n: 0.0, growth_mm_per_n: 0.0, length_mm: 0.0 };
 
-    /// Of a contact between a tooth of this radius and width and a body whose point at `depth_mm` does not move.
+    /// Builds the law between a tooth of this radius and width and a body that is fixed at the depth `depth_mm`.
     pub(crate) fn new(
         materials: &Materials,
         contact: Contact,
@@ -54,7 +56,7 @@ impl JohnsonLine {
         let of_tooth = per_width(materials.teeth.compliance_per_mpa());
         let of_mate = per_width(mate.compliance_per_mpa());
         let depth_mm = depth_mm.unwrap_or(tooth_radius_mm);
-        // Counted from the lesser of the two lengths, which the half-width stays below: so every logarithm is positive.
+        // The reference is the lesser length, which exceeds the half-width, so every logarithm is positive.
         let length_mm = depth_mm.min(tooth_radius_mm);
         let nu = mate.poissons_ratio;
         let compliance_mm_per_n = of_tooth * (4.0 * LN_2 - 1.0 + 2.0 * (tooth_radius_mm / length_mm).ln())
@@ -62,7 +64,7 @@ impl JohnsonLine {
         Self { compliance_mm_per_n, growth_mm_per_n: of_tooth + of_mate, length_mm }
     }
 
-    /// The law where the curvatures sum to `curvature_per_mm`: `b² = 4 B F/Σ`.
+    /// Returns the law for curvatures that sum to `curvature_per_mm`: `b² = 4 B F/Σ`.
     pub(crate) fn at(&self, curvature_per_mm: f64) -> JohnsonAt {
         let reference_n = self.length_mm * (self.length_mm * curvature_per_mm) / (4.0 * self.growth_mm_per_n);
         JohnsonAt { compliance_mm_per_n: self.compliance_mm_per_n, growth_mm_per_n: self.growth_mm_per_n, reference_n }

@@ -1,4 +1,4 @@
-//! What a contact of a tooth is: how it gives way under a force and what pressure the force makes (docs/theory.md sections 4.3 and 5).
+//! Contacts of a tooth: approach and pressure under a force (docs/explanation/theory.md sections 4.3 and 5).
 
 pub mod flat;
 pub(crate) mod line;
@@ -16,29 +16,31 @@ use flat::FlatContact;
 use line::JohnsonLine;
 use point::EllipticContact;
 
-/// The shape of a tooth, as its contacts need it.
+/// Shape of a tooth, as its contacts need it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ToothContact {
-    /// A cylinder: lines at all three.
+    /// A cylinder: line contacts at all three contacts.
     Cylinder,
-    /// A ball: ellipses at all three.
+    /// A ball: elliptic contacts at all three contacts.
     Ball {
-        /// Radius across the plane of motion of a groove that the ball runs in, above the ball's own; a contact without one is straight along the axis.
+        /// Groove radius across the plane of motion, larger than the ball's. A contact without a groove is straight
+        /// along the axis.
         groove_radius_mm: PerContact<Option<f64>>,
     },
-    /// A cylinder with two flats, which lie on the walls of the slot: lines at wave generator and ring, a rectangle at the carrier.
+    /// A cylinder with two flats on the walls of the slot: lines at wave generator and ring, a rectangle at the
+    /// carrier.
     FlatSided {
         /// Length of the flat along the slot.
         flat_length_mm: f64,
         /// Inner radius of the carrier, where its slots begin.
         carrier_inner_radius_mm: f64,
-        /// Its outer radius, where they end.
+        /// Outer radius of the carrier, where its slots end.
         carrier_outer_radius_mm: f64,
     },
 }
 
 impl ToothContact {
-    /// Of a drive's teeth. Flats are borne by a carrier of these radii, which no other teeth ask for.
+    /// Returns the shape of a drive's teeth. The carrier radii are used for flats only.
     pub fn of(drive: &Drive, carrier: CarrierRadii) -> Self {
         match drive.parameters().tooth {
             ToothShape::Cylinder { .. } => Self::Cylinder,
@@ -51,7 +53,7 @@ impl ToothContact {
     }
 }
 
-/// How force and approach of one contact go together, wherever it stands.
+/// Relation of force and approach at one contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Law {
     /// `δ = F/k`.
@@ -60,22 +62,22 @@ enum Law {
     Power { exponent: f64, coefficient: f64 },
     /// Johnson's line.
     Johnson(JohnsonLine),
-    /// Hertz's ellipse, whose coefficient the place decides.
+    /// Hertz's ellipse, whose coefficient depends on the place.
     Ellipse,
-    /// A flat, whose compliance the place decides.
+    /// A flat, whose compliance depends on the place.
     Flat,
 }
 
-/// The law of the three contacts of a tooth, for whoever works in columns.
+/// Law of the three contacts of a tooth, for column-wise evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ToothLaw {
-    /// `δ = F/k`, what stands behind the contact included.
+    /// `δ = F/k`, including the series compliance.
     Linear { compliance_mm_per_n: PerContact<f64> },
-    /// Palmgren's `δ = q F^0.9`, alike at all three.
+    /// Palmgren's `δ = q F^0.9`, the same at all three contacts.
     Palmgren { coefficient: f64 },
-    /// The same at wave generator and ring and, unless a flat lies there, at the carrier, and what gives way besides in proportion to the force.
+    /// Palmgren's law at wave generator, ring and (unless a flat is there) carrier, plus a linear compliance.
     PalmgrenAndLinear { coefficient: PerContact<f64>, compliance_mm_per_n: PerContact<f64> },
-    /// Johnson's line, and what stands behind it.
+    /// Johnson's line, plus the series compliance.
     Johnson { law: PerContact<JohnsonLine>, series_compliance_mm_per_n: PerContact<f64> },
     /// Hertz's ellipses.
     Hertz,
@@ -84,31 +86,31 @@ pub(crate) enum ToothLaw {
 /// `p` of Palmgren's law.
 pub(crate) const PALMGREN_EXPONENT: f64 = 0.9;
 
-/// The powers of the stresses that forces go with.
+/// Powers of the stresses to which forces are proportional.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StressExponents {
     /// 2 at all three contacts.
     Lines,
-    /// 3.
+    /// 3 at all three contacts.
     Ellipses,
     /// 2 at wave generator and ring, 1 at the carrier.
     LinesAndFlat,
 }
 
 impl StressExponents {
-    /// Whether all three are.
+    /// Returns true if all three powers are equal.
     #[inline(always)]
     pub(crate) const fn are_alike(self) -> bool {
         !matches!(self, Self::LinesAndFlat)
     }
 
-    /// Whether that of one of them is 1.
+    /// Returns true if the power at the contact is 1.
     #[inline(always)]
     pub(crate) const fn is_one_at(self, contact: Contact) -> bool {
         matches!((self, contact), (Self::LinesAndFlat, Contact::Carrier))
     }
 
-    /// By how much a force is more where the stress at wave generator or ring is more by a factor.
+    /// Returns the factor of the force for a factor of the stress at wave generator or ring.
     #[inline(always)]
     pub(crate) fn raised(self, factor: f64) -> f64 {
         match self {
@@ -117,14 +119,14 @@ impl StressExponents {
         }
     }
 
-    /// The same at any contact.
+    /// Returns the factor of the force for a factor of the stress at any contact.
     #[inline(always)]
     pub(crate) fn raised_at(self, contact: Contact, factor: f64) -> f64 {
         if self.is_one_at(contact) { factor } else { self.raised(factor) }
     }
 }
 
-/// A contact of a ball, whose curvature in the plane of motion the place decides.
+/// Contact of a ball, whose curvature in the plane of motion depends on the place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct BallContact {
     axial_per_mm: f64,
@@ -132,13 +134,13 @@ pub(crate) struct BallContact {
 }
 
 impl BallContact {
-    /// Where the curvatures in the plane of motion sum to `curvature_per_mm`.
+    /// Returns the contact for curvatures in the plane of motion that sum to `curvature_per_mm`.
     pub(crate) fn at(&self, curvature_per_mm: f64) -> Result<EllipticContact, NotConverged> {
         EllipticContact::new(curvature_per_mm, self.axial_per_mm, self.modulus_mpa)
     }
 }
 
-/// A flat on the wall of its slot, wherever the tooth stands.
+/// Flat on the wall of its slot, at any place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Flat {
     length_mm: f64,
@@ -146,65 +148,66 @@ pub(crate) struct Flat {
     carrier_inner_radius_mm: f64,
     carrier_outer_radius_mm: f64,
     modulus_mpa: f64,
-    /// Whether it gives way by its own law.
+    /// True if it has its own compliance law.
     pub(crate) has_own_law: bool,
 }
 
 impl Flat {
-    /// The length that is borne where the tooth's centre is `center_radius_mm` from the axis; nothing or less where the flat has left the carrier.
+    /// Returns the supported length for a tooth centre at `center_radius_mm` from the axis. It is zero or negative if
+    /// the flat has left the carrier.
     pub(crate) fn borne_mm(&self, center_radius_mm: f64) -> f64 {
         let inner_mm = (center_radius_mm - 0.5 * self.length_mm).max(self.carrier_inner_radius_mm);
         let outer_mm = (center_radius_mm + 0.5 * self.length_mm).min(self.carrier_outer_radius_mm);
         outer_mm - inner_mm
     }
 
-    /// The contact over so much of its length.
+    /// Returns the contact over this length.
     pub(crate) const fn over(&self, borne_mm: f64) -> FlatContact {
         FlatContact::new(borne_mm, self.width_mm)
     }
 
-    /// The contact over all of its length.
+    /// Returns the contact over its whole length.
     pub(crate) const fn whole(&self) -> FlatContact {
         self.over(self.length_mm)
     }
 
-    /// How far it gives way under 1 N over so much of its length.
+    /// Returns its approach under 1 N over this length.
     pub(crate) fn compliance_mm_per_n(&self, borne_mm: f64) -> f64 {
         self.over(borne_mm).compliance_mm_per_n(self.modulus_mpa)
     }
 }
 
-/// What the pressure of a contact at a place follows from.
+/// Pressure model of a contact at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pressure {
     /// Hertz's line.
     Line {
-        /// Its law.
+        /// Stress law.
         hertz: HertzLine,
-        /// Relative curvature.
+        /// Relative curvature, in 1/mm.
         curvature_per_mm: f64,
     },
     /// Hertz's ellipse.
     Ellipse(EllipticContact),
-    /// An even pressure.
+    /// Uniform pressure.
     Flat(FlatContact),
-    /// That of a corner, of which nothing is told: as Hertz has it there is none, and it would have no end in a sharp one.
+    /// Contact with a corner. No pressure is calculated: by Hertz there is none, and at a sharp corner it is infinite.
     Corner(CornerContact),
 }
 
-/// A tooth against the corner that ends the ring's flank.
+/// Contact of a tooth with the corner that ends the ring's flank.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CornerContact {
-    /// Relative curvature of the tooth and the flank's end.
+    /// Relative curvature of the tooth and the flank's end, in 1/mm.
     pub(crate) curvature_per_mm: f64,
-    /// By how much the contact is turned against the flank's normal there.
+    /// Angle between the contact and the flank's normal there.
     pub(crate) angle_rad: f64,
-    /// How much more the ring's tooth bends for each unit of the logarithm by which the contact is narrower.
+    /// Growth of the ring tooth's bending compliance for each unit of the logarithm by which the contact is narrower.
     pub(crate) bending_growth_mm_per_n: f64,
 }
 
 impl Pressure {
-    /// The largest pressure under a force; the mean one of a flat, none of a corner.
+    /// Returns the largest pressure under a force; the mean pressure for a flat, 0 for a corner.
     pub fn stress_mpa(&self, force_n: f64) -> f64 {
         match self {
             Self::Line { hertz, curvature_per_mm } => hertz.stress_mpa(force_n, *curvature_per_mm),
@@ -214,8 +217,9 @@ impl Pressure {
         }
     }
 
-    /// The pressure in the middle plane, summed along the plane of motion: of an ellipse `π a p/2`, a its half-width; elsewhere the force
-    /// over the width. None of a corner, on which a tooth stays: it wears there as no flank does.
+    /// Returns the pressure in the middle plane, integrated along the plane of motion. For an ellipse it is `π a p/2`
+    /// with its half-width a, otherwise the force over the width. It is 0 for a corner, which stays in contact: its
+    /// wear differs from a flank's.
     pub fn line_load_n_per_mm(&self, force_n: f64, tooth_width_mm: f64) -> f64 {
         match self {
             Self::Line { .. } | Self::Flat(_) => force_n / tooth_width_mm,
@@ -224,7 +228,7 @@ impl Pressure {
         }
     }
 
-    /// The inverse of [`Self::stress_mpa`].
+    /// Returns the force for a stress, the inverse of [`Self::stress_mpa`].
     pub fn force_n(&self, stress_mpa: f64) -> f64 {
         match self {
             Self::Line { hertz, curvature_per_mm } => hertz.force_n(stress_mpa, *curvature_per_mm),
@@ -254,7 +258,7 @@ pub(crate) struct ToothSize {
     pub(crate) width_mm: f64,
 }
 
-/// The law of one contact of a shape; none where the shape has no such contact.
+/// Returns the law of one contact of a shape; none if the shape has no such contact.
 fn law_of(
     shape: &ToothContact,
     law: &ContactLaw,
@@ -284,7 +288,7 @@ fn law_of(
     })
 }
 
-/// The approach at the wave generator under a force by a law of cylinders that knows no place.
+/// Returns the approach at the wave generator under a force, by a law of cylinders that does not depend on the place.
 pub(crate) fn plain_approach_mm(
     law: &ContactLaw,
     materials: &Materials,
@@ -299,19 +303,19 @@ pub(crate) fn plain_approach_mm(
     }
 }
 
-/// A contact where a tooth stands.
+/// Contact of a tooth at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Place {
     /// Force over `F_H`.
     pub(crate) force_ratio: f64,
-    /// What its approach counts along `F_H`.
+    /// Weight of its approach along `F_H`.
     pub(crate) weight: f64,
-    /// What pressure it has.
+    /// Pressure model.
     pub(crate) pressure: Pressure,
 }
 
 impl Contacts {
-    /// The contacts; without a law of their own shape, none.
+    /// Builds the contacts; none if the law does not apply to the shape.
     pub(crate) fn new(
         shape: &ToothContact,
         law: &ContactLaw,
@@ -336,12 +340,13 @@ impl Contacts {
         })
     }
 
-    /// Hertz's line at a contact, for whoever works in columns.
+    /// Returns Hertz's line law at a contact, for column-wise evaluation.
     pub(crate) const fn hertz(&self, contact: Contact) -> &HertzLine {
         self.hertz.get(contact)
     }
 
-    /// The law for whoever works in columns; none where it has no columns. Of a flat that gives way by its own law there is only what stands behind it.
+    /// Returns the law for column-wise evaluation; none if it has no columns. A flat with its own law contributes only
+    /// its series compliance.
     pub(crate) fn tooth_law(&self) -> Option<ToothLaw> {
         let series = &self.series_compliance_mm_per_n;
         let is_alone = series.iter().all(|(_, &compliance)| compliance == 0.0);
@@ -386,16 +391,16 @@ impl Contacts {
         }
     }
 
-    /// A contact of balls.
+    /// Returns a contact of balls.
     pub(crate) fn ball(&self, contact: Contact) -> Option<BallContact> {
         let ToothContact::Ball { groove_radius_mm } = &self.shape else { return None };
         let r = self.tooth_radius_mm;
-        // 1/r - 1/r_g without the difference of near numbers.
+        // 1/r - 1/r_g without a difference of nearly equal numbers.
         let axial_per_mm = groove_radius_mm.get(contact).map_or(1.0 / r, |groove| (groove - r) / groove / r);
         Some(BallContact { axial_per_mm, modulus_mpa: *self.modulus_mpa.get(contact) })
     }
 
-    /// The flat of flat-sided teeth.
+    /// Returns the flat of flat-sided teeth.
     pub(crate) fn flat(&self) -> Option<Flat> {
         let ToothContact::FlatSided { flat_length_mm, carrier_inner_radius_mm, carrier_outer_radius_mm } = self.shape
         else {
@@ -411,8 +416,8 @@ impl Contacts {
         })
     }
 
-    /// What pressure a contact has where the curvatures in the plane of motion sum to `curvature_per_mm` and the tooth's centre is
-    /// `center_radius_mm` from the axis; none where a flat has left the carrier.
+    /// Returns the pressure model of a contact, for curvatures in the plane of motion that sum to `curvature_per_mm`
+    /// and a tooth centre at `center_radius_mm` from the axis. Returns none if a flat has left the carrier.
     pub(crate) fn pressure(
         &self,
         contact: Contact,
@@ -429,12 +434,13 @@ impl Contacts {
         Ok(Some(Pressure::Line { hertz: *self.hertz.get(contact), curvature_per_mm }))
     }
 
-    /// `ξ = Σ w δ` of a tooth over `F_H`, where the ring gives way by so much more than at its root.
+    /// Returns `ξ = Σ w δ` of a tooth over `F_H`, including this compliance of the ring in excess of that at its root.
     pub(crate) fn approach(&self, places: &PerContact<Place>, ring_bending_mm_per_n: f64) -> Approach {
         let mut linear_mm_per_n = places.ring.weight * (ring_bending_mm_per_n * places.ring.force_ratio);
         let mut power: Option<(f64, f64)> = None;
         let mut growth_mm_per_n = 0.0;
-        // The contact that first reaches the width at which Johnson's law ends sets the force that logarithms count from: so all are positive.
+        // The contact that first reaches the end of Johnson's law sets the reference force of the logarithms, so all
+        // are positive.
         let johnson = PerContact::of(|contact| match (self.law.get(contact), &places.get(contact).pressure) {
             (
                 Law::Johnson(law),
@@ -462,7 +468,8 @@ impl Contacts {
                 (Law::Flat, Pressure::Flat(flat)) => {
                     linear_mm_per_n += weight * (flat.compliance_mm_per_n(*self.modulus_mpa.get(contact)) * ratio);
                 }
-                // A contact without a force has no approach, and a law stands only beside the pressure of its own shape.
+                // A contact without a force has no approach, and a law only occurs with the pressure model of its own
+                // shape.
                 (Law::Johnson(_) | Law::Ellipse | Law::Flat, _) => {
                     if let Some(law) = johnson.get(contact).filter(|_| ratio > 0.0) {
                         let ln = (law.reference_n / ratio / reference_n).ln();
@@ -494,7 +501,7 @@ impl Contacts {
 }
 
 impl ContactLaw {
-    /// The numbers that the law itself brings.
+    /// Returns the numerical parameters of the law.
     pub(crate) fn parameters(&self) -> Vec<(Parameter, f64)> {
         match self {
             Self::Linear | Self::Palmgren | Self::Hertz => Vec::new(),
@@ -508,7 +515,7 @@ impl ContactLaw {
         }
     }
 
-    /// Whether the law goes with `projection`.
+    /// Returns true if the law can be combined with `projection`.
     pub const fn is_of_projection(&self) -> bool {
         match self {
             Self::Linear | Self::Fixed(_) | Self::Palmgren => true,

@@ -1,13 +1,15 @@
-//! Point contact: the ellipse of Hertz (docs/theory.md sections 4.3 and 5).
+//! Point contact: Hertz's ellipse (docs/explanation/theory.md sections 4.3 and 5).
 
 use std::f64::consts::{FRAC_2_PI, PI};
 
 use crate::root::NotConverged;
 
-/// Carlson's symmetric integral of the second kind `R_D(x, y, z) = (3/2) ∫ dt/(√(t+x) √(t+y) (t+z)^(3/2))` over t from 0 on, for `x, y ≥ 0` not both nil
-/// and `z > 0`, by duplication (B. C. Carlson, *Numerical computation of real or complex elliptic integrals*, Numerical Algorithms 10, 1995).
+/// Returns Carlson's symmetric integral of the second kind `R_D(x, y, z) = (3/2) ∫ dt/(√(t+x) √(t+y) (t+z)^(3/2))` from
+/// t = 0. Needs `x, y ≥ 0`, not both zero, and `z > 0`. Method: duplication (B. C. Carlson, *Numerical computation of
+/// real or complex elliptic integrals*, Numerical Algorithms 10, 1995).
 fn carlson_rd(x: f64, y: f64, z: f64) -> f64 {
-    /// Each duplication quarters the distances from the mean, and the series below errs by their sixth power: this leaves nothing in doubles.
+    /// Each duplication divides the distances from the mean by four. The error of the series is their sixth power:
+    /// below doubles.
     const NEAR: f64 = 1.5e-3;
     let (mut x, mut y, mut z) = (x, y, z);
     let (mut sum, mut share) = (0.0, 1.0);
@@ -34,7 +36,7 @@ fn carlson_rd(x: f64, y: f64, z: f64) -> f64 {
     }
 }
 
-/// The complete elliptic integrals of Legendre's that a contact ellipse needs, for the parameter `m = 1 - k1²`, as sums of positive terms:
+/// Complete elliptic integrals of a contact ellipse for the parameter `m = 1 - k1²`, as sums of positive terms:
 /// `B = (E - k1² K)/m` and `D = (K - E)/m`, both π/4 for a circle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Integrals {
@@ -43,7 +45,7 @@ struct Integrals {
 }
 
 impl Integrals {
-    /// Of the ratio `k1` of the half-axes, short to long.
+    /// Returns the integrals for the ratio `k1` of the half-axes, short to long.
     fn new(ratio: f64) -> Self {
         let squared = ratio * ratio;
         Self { b: squared * carlson_rd(0.0, 1.0, squared) / 3.0, d: carlson_rd(0.0, squared, 1.0) / 3.0 }
@@ -58,35 +60,37 @@ impl Integrals {
     }
 }
 
-/// The contact of two bodies of which the curvatures, convex positive, sum to `Σ` in either of two planes at a right angle.
+/// Contact of two bodies whose curvatures, convex positive, sum to `Σ` in either of two perpendicular planes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EllipticContact {
     /// `k1`: short over long half-axis.
     ratio: f64,
-    /// Whether the short half-axis lies in the plane of motion.
+    /// True if the short half-axis is in the plane of motion.
     is_short_in_plane: bool,
-    /// Long half-axis under 1 N.
+    /// Long half-axis under 1 N, in mm.
     long_mm: f64,
-    /// Largest pressure under 1 N.
+    /// Largest pressure under 1 N, in MPa.
     stress_mpa: f64,
-    /// Approach under 1 N.
+    /// Approach under 1 N, in mm.
     approach_mm: f64,
 }
 
-/// The largest shear stress below a contact, in the plane of its short half-axis and the normal.
+/// Largest shear stress below a contact, in the plane of its short half-axis and the normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShearBelow {
-    /// Over the largest pressure.
+    /// Shear stress over the largest pressure.
     pub share: f64,
-    /// Its depth over the short half-axis.
+    /// Depth over the short half-axis.
     pub depth: f64,
 }
 
 impl EllipticContact {
-    /// Forces go as the cube of the half-axes and of the pressure.
+    /// Exponent of the force in the approach. The force is proportional to the cube of the half-axes and of the
+    /// pressure.
     pub const EXPONENT: f64 = 2.0 / 3.0;
 
-    /// Of the curvatures in the plane of motion and along the axis, in 1/mm, both positive, and the contact modulus.
+    /// Builds the contact from the curvatures in the plane of motion and along the axis, in 1/mm, both positive, and
+    /// the modulus.
     ///
     /// # Errors
     /// [`NotConverged`] if the ratio of the half-axes is not found.
@@ -106,27 +110,27 @@ impl EllipticContact {
         Ok(Self { ratio, is_short_in_plane, long_mm, stress_mpa, approach_mm })
     }
 
-    /// `q` in `δ = q F^(2/3)`.
+    /// Returns `q` in `δ = q F^(2/3)`.
     pub const fn coefficient(&self) -> f64 {
         self.approach_mm
     }
 
-    /// Largest pressure, `3F/(2π short long)`.
+    /// Returns the largest pressure, `3F/(2π short long)`.
     pub fn stress_mpa(&self, force_n: f64) -> f64 {
         self.stress_mpa * force_n.cbrt()
     }
 
-    /// The force that makes the largest pressure `stress_mpa`.
+    /// Returns the force that makes the largest pressure `stress_mpa`.
     pub fn force_n(&self, stress_mpa: f64) -> f64 {
         (stress_mpa / self.stress_mpa).powi(3)
     }
 
-    /// Half the width in the plane of motion.
+    /// Returns half the width in the plane of motion.
     pub fn half_width_mm(&self, force_n: f64) -> f64 {
         self.half_axis_mm(self.is_short_in_plane, force_n)
     }
 
-    /// Half the length along the axis.
+    /// Returns half the length along the axis.
     pub fn half_length_mm(&self, force_n: f64) -> f64 {
         self.half_axis_mm(!self.is_short_in_plane, force_n)
     }
@@ -136,13 +140,13 @@ impl EllipticContact {
         if is_short { self.ratio * long_mm } else { long_mm }
     }
 
-    /// The largest shear below the surface of a body with this Poisson's ratio, on the axis of symmetry.
+    /// Returns the largest shear stress below the surface of a body with this Poisson's ratio, on the axis of symmetry.
     pub fn shear_below(&self, poissons_ratio: f64) -> ShearBelow {
         let shear = |depth: f64| shear_at(self.ratio, poissons_ratio, depth);
-        // From a circle (0.38 to 0.57 for ν up to 0.5) to a line (0.786) it stands between these depths, alone.
+        // The only maximum is between these depths, from a circle (0.38 to 0.57 for ν up to 0.5) to a line (0.786).
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let (mut low, mut high) = (0.05, 1.2);
-        // Sixty steps leave 1e-13 of the bracket, more than a maximum can be placed.
+        // Sixty steps leave 1e-13 of the bracket, finer than a maximum can be located.
         for _ in 0..60 {
             let (left, right) = (high - golden * (high - low), low + golden * (high - low));
             if shear(left) > shear(right) { high = right } else { low = left }
@@ -152,18 +156,19 @@ impl EllipticContact {
     }
 }
 
-/// The ratio of the half-axes, short to long, for a ratio of curvatures of at least 1: the root of `c_max/c_min = B/(k1² D)`, in logarithms.
+/// Returns the ratio of the half-axes, short to long, for a ratio of curvatures of at least 1. It is the root of
+/// `c_max/c_min = B/(k1² D)`, in logarithms.
 fn ratio_of_half_axes(curvature_ratio: f64) -> Result<f64, NotConverged> {
     const CAP: u32 = 60;
     let wanted = curvature_ratio.ln();
-    // Hamrock and Brewe's approximation, 4 % off at most.
+    // Hamrock and Brewe's approximation, with an error of 4 % at most.
     let mut ln_ratio = -FRAC_2_PI * wanted;
     for _ in 0..CAP {
         let ratio = ln_ratio.exp();
         let Integrals { b, d } = Integrals::new(ratio);
         let squared = ratio * ratio;
         let m = (1.0 - ratio) * (1.0 + ratio);
-        // d ln(B/D)/dm = (D - B)/(2mB) - (B/k1² - D)/(2mD), at a circle -1/4; the slope is a matter of speed alone.
+        // d ln(B/D)/dm = (D - B)/(2mB) - (B/k1² - D)/(2mD), at a circle -1/4. The slope affects only the speed.
         let slope_m = if m < 1e-4 { -0.25 } else { ((d - b) / b - (b / squared - d) / d) / (2.0 * m) };
         let step = ((b / d).ln() - 2.0 * ln_ratio - wanted) / (2.0 * squared * slope_m + 2.0);
         ln_ratio = (ln_ratio + step).min(0.0);
@@ -174,8 +179,9 @@ fn ratio_of_half_axes(curvature_ratio: f64) -> Result<f64, NotConverged> {
     Err(NotConverged { what: "ratio of a contact's half-axes", iterations: CAP, bracket_width: ln_ratio })
 }
 
-/// Half the difference of the stresses along the short half-axis and the normal, over the largest pressure, `depth` short half-axes below the
-/// middle of the contact (K. L. Johnson, *Contact Mechanics*, 1985, equation 3.69, with its differences of elliptic integrals as Carlson's).
+/// Returns half the difference of the stresses along the short half-axis and the normal, over the largest pressure. The
+/// point is `depth` short half-axes below the middle of the contact. Source: K. L. Johnson, *Contact Mechanics*, 1985,
+/// equation 3.69, with its differences of elliptic integrals as Carlson's.
 fn shear_at(ratio: f64, poissons_ratio: f64, depth: f64) -> f64 {
     let k2 = ratio * ratio;
     let zeta = depth * ratio;

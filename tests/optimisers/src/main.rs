@@ -28,7 +28,7 @@ mod random;
 /// A problem over the unit cube: two objectives to be least, limits to be kept.
 #[derive(Clone, Copy)]
 enum Benchmark {
-    /// That of docs/studies.md: ratio 20, 200 N·m, 120 mm, by the paper's model at 16 intervals.
+    /// That of docs/how-to/studies.md: ratio 20, 200 N·m, 120 mm, by the paper's model at 16 intervals.
     Drive,
     /// A. Osyczka, S. Kundu, Structural Optimization 10, 1995, 94-99.
     Osy,

@@ -1,7 +1,8 @@
-//! `POST /v1/batch`: many design documents for one endpoint, a line each, answered in their order while they are read.
+//! `POST /v1/batch`: many design documents for one endpoint, one a line. Answers are streamed in the order of the
+//! lines.
 //!
-//! Lines that have arrived are answered together, 5 ms of them in one computation in the background. As many computations run at once as
-//! there are permits. If the client does not read the answers, no further line is begun.
+//! Lines are answered in slices of 5 ms; each slice is one background computation. As many computations run at once as
+//! there are permits. If the client does not read, no further line is computed.
 
 use std::io::{self, Write as _};
 use std::sync::Arc;
@@ -29,9 +30,9 @@ use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::SweepAnswer;
+use toothwave_calculation::sweep::peaks_only::PeaksOnly;
 use utoipa::ToSchema;
 
-use super::peaks::PeaksOnly;
 use crate::app::App;
 use crate::compute::budget::{FREE_BYTES, Reservation};
 use crate::compute::pool::catch_panic;
@@ -41,90 +42,91 @@ use crate::http::observe::note_problem;
 use crate::http::problem::{Problem, ProblemCode};
 use crate::ops::config::CLIENT_TIMEOUT_MS;
 
-/// What is read of a batch before its answer begins, behind a proxy: nginx passes on no more of a request once its answer has begun.
+/// Bytes that are read before the response begins, behind a proxy. nginx forwards no more of a request after its
+/// response has begun.
 const READ_AHEAD_BYTES: usize = 8 << 20;
 
-/// Lines that are answered together at most.
+/// Most lines in one slice.
 const CHUNK_LINES: usize = 64;
 
-/// A computation begins no further line after this time.
+/// Time after which a slice computes no further line.
 const SLICE: Duration = Duration::from_millis(5);
 
-/// A computation begins no further line after this many bytes of answers.
+/// Bytes of answers after which a slice computes no further line.
 const SLICE_BYTES: usize = 1 << 20;
 
-/// The media type of a batch and of its answers.
+/// Media type of a batch and of its answers.
 const NDJSON: &str = "application/x-ndjson";
 
-/// What a batch asks of each document.
+/// Calculation that a batch runs for each document.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ToSchema, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum BatchEndpoint {
     /// Profiles of the mating parts
     Geometry,
-    /// How many teeth share the load
+    /// Contact ratio (coincidence degree): how many teeth share the load
     CoincidenceDegree,
     /// Forces and contact stresses over one period
     #[default]
     Sweep,
 }
 
-/// How a batch is answered.
+/// Query parameters of a batch.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields, default)]
 #[into_params(parameter_in = Query)]
 pub struct BatchQuery {
-    /// The endpoint that every document is put to.
+    /// The calculation for every document.
     #[param(inline, required = false)]
     pub endpoint: BatchEndpoint,
-    /// Of sweeps, the peaks and the totals of the losses, without the states and all other columns.
+    /// For sweeps: return the peaks and the totals of the losses, without the states and all other columns.
     #[param(required = false)]
     pub peaks_only: bool,
 }
 
 impl BatchQuery {
-    /// Checks that `peaks_only` is asked of sweeps.
+    /// Checks that `peaks_only` is used with sweeps alone.
     pub fn require_possible(self) -> Result<(), Problem> {
         if self.peaks_only && self.endpoint != BatchEndpoint::Sweep {
-            let detail = "only sweeps have peaks. Leave out `peaks_only`, or ask the endpoint `sweep`";
+            let detail = "`peaks_only` needs the endpoint `sweep`. Leave out `peaks_only`, or set `endpoint=sweep`";
             return Err(Problem::new(ProblemCode::InvalidQuery, detail));
         }
         Ok(())
     }
 }
 
-/// One line of the answer: that of the document with this index, with `answer` or `problem`.
+/// One line of the response: the answer or the problem of one document.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct BatchLine<A> {
-    /// Which document, from 0; blank lines do not count.
+    /// Index of the document, from 0. Blank lines do not count.
     pub index: u64,
-    /// The status that the document would have been answered with by itself.
+    /// HTTP status that a single request with this document would get.
     pub status: u16,
-    /// The answer, as the endpoint has it.
+    /// The answer of the endpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub answer: Option<A>,
-    /// Why there is none.
+    /// The problem, if there is no answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub problem: Option<Problem>,
 }
 
-/// The last line: whoever finds it has all the others.
+/// The last line. It shows that the response is complete.
 #[derive(Debug, Default, Clone, Serialize, ToSchema)]
 pub struct BatchEnd {
-    /// Documents that arrived.
+    /// Documents that were received.
     pub asked: u64,
-    /// Lines that answer them.
+    /// Documents that were answered.
     pub answered: u64,
-    /// Why no more arrived, if the batch broke off.
+    /// The problem that ended the batch early.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub problem: Option<Problem>,
 }
 
 impl BatchEnd {
-    /// The line.
+    /// Returns the line as JSON.
     pub fn line(&self) -> Vec<u8> {
         let mut line = serde_json::to_vec(self).unwrap_or_default();
         line.push(b'\n');
@@ -132,7 +134,7 @@ impl BatchEnd {
     }
 }
 
-/// The line of a document that has no answer; counts it and logs the cause of an internal error.
+/// Returns the line of a document without an answer, counts it, and logs the cause of an internal error.
 fn problem_line(index: u64, problem: Problem) -> Vec<u8> {
     count(problem.status);
     note_problem(&problem);
@@ -146,7 +148,7 @@ fn count(status: u16) {
     counter!("toothwave_batch_documents_total", "status" => status.to_string()).increment(1);
 }
 
-/// The line of an answer.
+/// Returns the line of an answer.
 fn answer_line<A: Forms>(index: u64, answer: &A, stop: &AtomicBool) -> Result<Vec<u8>, Problem> {
     let status = StatusCode::OK.as_u16();
     let line = BatchLine { index, status, answer: Some(answer), problem: None };
@@ -157,7 +159,7 @@ fn answer_line<A: Forms>(index: u64, answer: &A, stop: &AtomicBool) -> Result<Ve
     Ok(writer.inner)
 }
 
-/// The line that answers one document, computed at once.
+/// Computes the line of one document at once.
 pub fn computed_line(query: BatchQuery, index: u64, document: &[u8], limits: &Limits) -> Vec<u8> {
     fn line<Q: Question>(question: &Q, index: u64, document: &[u8], limits: &Limits) -> Result<Vec<u8>, Problem> {
         let never = AtomicBool::new(false);
@@ -172,21 +174,21 @@ pub fn computed_line(query: BatchQuery, index: u64, document: &[u8], limits: &Li
     line.unwrap_or_else(|problem| problem_line(index, problem))
 }
 
-/// A document that waits for its answer, or the reason why there is none.
+/// Index and content of a line, or the reason for a missing content.
 type Line = (u64, Result<Bytes, Problem>);
 
-/// Computes the line of a large answer, which has to fit into its reservation.
+/// Computes the line of a large answer, which must fit into its reservation.
 type Compute = Box<dyn FnOnce(Option<&Reservation>, &AtomicBool) -> Result<Vec<u8>, Problem> + Send>;
 
-/// The outcome of a document.
+/// Outcome for one document.
 enum Outcome {
-    /// Its line.
+    /// The finished line.
     Line(Vec<u8>),
-    /// Its answer has to reserve this many bytes first.
+    /// Bytes that the answer must reserve first, and the computation.
     Large(u64, Compute),
 }
 
-/// The outcomes of one slice. They are kept if the deadline ends the slice.
+/// Outcomes of one slice. They remain if the deadline ends the slice.
 #[derive(Default)]
 struct Progress {
     current: Option<u64>,
@@ -221,7 +223,7 @@ fn answered<Q: Question>(
     answer_line(index, &answer, stop)
 }
 
-/// Answers lines until the time or the bytes of a slice are used up.
+/// Answers lines until the slice has used its time or its bytes.
 fn answer_lines(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex<Progress>, stop: &AtomicBool) {
     let (started, mut bytes) = (Instant::now(), 0);
     for (index, document) in lines {
@@ -238,7 +240,7 @@ fn answer_lines(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex
             (Ok(document), BatchEndpoint::Sweep) => outcome(app, &Sweep, index, &document, stop),
         });
         let mut progress = progress.lock();
-        // If the deadline has ended this line, its problem is written already.
+        // `slice` reports a line that the deadline has ended.
         if stop.load(Ordering::Relaxed) || progress.current.take() != Some(index) {
             return;
         }
@@ -251,7 +253,8 @@ fn answer_lines(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex
     }
 }
 
-/// Runs a computation in a task of its own: a future that got a permit must be polled, also while the client reads nothing.
+/// Runs a computation in its own task, which goes on while the client does not read. Otherwise it would keep its permit
+/// from other requests for as long as the client likes.
 async fn in_task<T: Send + 'static>(
     computation: impl Future<Output = Result<T, Problem>> + Send + 'static,
 ) -> Result<T, Problem> {
@@ -259,7 +262,7 @@ async fn in_task<T: Send + 'static>(
     task.await.unwrap_or_else(|panic| Err(Problem::internal(&panic)))
 }
 
-/// Computes one slice: the outcomes of the first line and of as many others as fit, and the lines behind them.
+/// Computes one slice. Returns the outcomes of its lines (at least one) and the remaining lines.
 async fn slice(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (Vec<(u64, Outcome)>, Vec<Line>) {
     let progress = Arc::new(Mutex::new(Progress::default()));
     let (shared, waiting) = (Arc::clone(&progress), lines.clone());
@@ -275,17 +278,19 @@ async fn slice(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (Vec<(
     let mut progress = progress.lock();
     let mut outcomes = std::mem::take(&mut progress.outcomes);
     if let Err(problem) = result {
-        // Of the line that was computed. If none was, as when the service stops, of the next one: so every batch ends.
+        // The problem belongs to the current line, or to the first line if none has begun, as when the service stops.
+        // So every slice answers at least one line, and every batch ends.
         let next = lines.get(outcomes.len()).map(|(index, _)| *index).filter(|_| outcomes.is_empty());
         if let Some(index) = progress.current.take().or(next) {
             outcomes.push((index, Outcome::Line(problem_line(index, problem))));
         }
     }
+    // Lines are answered in order: the outcomes are those of the first lines.
     lines.drain(..outcomes.len());
     (outcomes, lines)
 }
 
-/// The line of a large answer, with the bytes that it has reserved.
+/// Computes the line of a large answer. The line holds its reservation.
 async fn answer_large_line(app: Arc<App>, index: u64, bytes: u64, compute: Compute) -> Bytes {
     let line = in_task(async move {
         let reservation = app.budget.reserve(bytes).await?;
@@ -299,13 +304,13 @@ async fn answer_large_line(app: Arc<App>, index: u64, bytes: u64, compute: Compu
     line.await.unwrap_or_else(|problem| problem_line(index, problem).into())
 }
 
-/// A part of the answer: lines that are written, or one that is to be computed.
+/// A part of the response: finished lines, or one line that must be computed.
 enum Part {
     Lines(u64, Vec<u8>),
     Large(u64, u64, Compute),
 }
 
-/// Short lines together, large ones by themselves.
+/// Joins short lines. A large line is a part of its own.
 fn parts(outcomes: Vec<(u64, Outcome)>) -> Vec<Part> {
     let mut parts = Vec::new();
     for (index, outcome) in outcomes {
@@ -321,11 +326,11 @@ fn parts(outcomes: Vec<(u64, Outcome)>) -> Vec<Part> {
     parts
 }
 
-/// The lines of a body that are not blank, until it ends; what ends it otherwise goes to `end`.
+/// Returns the lines of a body that are not blank. If the body ends early, the problem goes to `end`.
 fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<Item = Line> {
     let limit = app.limits.max_body_bytes;
     let reader = StreamReader::new(body.into_data_stream().map_err(io::Error::other));
-    // One byte more, for the carriage return of other systems.
+    // One byte more, for a carriage return.
     let codec = AnyDelimiterCodec::new_with_max_length(b"\n".to_vec(), Vec::new(), limit + 1);
     stream::unfold(FramedRead::new(reader, codec), move |mut framed| {
         let (app, end) = (Arc::clone(&app), Arc::clone(&end));
@@ -334,7 +339,7 @@ fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<It
                 let next = tokio::select! {
                     next = tokio::time::timeout(Duration::from_millis(CLIENT_TIMEOUT_MS), framed.next()) => next,
                     () = app.pool.stopped() => {
-                        end.lock().problem = Some(Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Send the rest again"));
+                        end.lock().problem = Some(Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Send the remaining lines again"));
                         return None;
                     }
                 };
@@ -343,10 +348,9 @@ fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<It
                     Ok(Some(Ok(line))) if line.trim_ascii().is_empty() => continue,
                     Ok(Some(Ok(line))) => Ok(Bytes::copy_from_slice(line.trim_ascii())),
                     Ok(Some(Err(AnyDelimiterCodecError::MaxChunkLengthExceeded))) => {
-                        // After an error the stream ends once, and goes on behind the line.
+                        // After this error the stream ends once; the next poll continues after the line.
                         framed.next().await;
-                        let detail =
-                            format!("the line has more than the {limit} bytes of `max_body_bytes`. Shorten it");
+                        let detail = format!("the line has more than {limit} bytes (`max_body_bytes`). Shorten it");
                         Err(Problem::new(ProblemCode::BodyTooLarge, detail))
                     }
                     Ok(Some(Err(AnyDelimiterCodecError::Io(error)))) => {
@@ -354,7 +358,8 @@ fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<It
                         return None;
                     }
                     Err(_) => {
-                        let detail = format!("no line arrived for {CLIENT_TIMEOUT_MS} ms. Send the rest again");
+                        let detail =
+                            format!("no line arrived for {CLIENT_TIMEOUT_MS} ms. Send the remaining lines again");
                         end.lock().problem = Some(Problem::new(ProblemCode::RequestTimeout, detail));
                         return None;
                     }
@@ -370,14 +375,14 @@ fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<It
     })
 }
 
-/// The answers in the order of the lines, and the last line.
+/// Returns the answers in the order of the lines, then the last line.
 fn answers(app: Arc<App>, query: BatchQuery, body: Body) -> impl Stream<Item = Bytes> {
     let end = Arc::new(Mutex::new(BatchEnd::default()));
     let at_once = app.pool.permits();
     let (counted, ending) = (Arc::clone(&end), Arc::clone(&end));
     let chunks = lines(Arc::clone(&app), body, end).ready_chunks(CHUNK_LINES);
     let (first_app, next_app, large_app) = (Arc::clone(&app), Arc::clone(&app), app);
-    // The first slices of chunks are computed side by side; further ones when the client has read those before.
+    // The first slices of several chunks run in parallel. The next slice of a chunk begins when the stream is polled for it.
     let first = chunks.map(move |lines| slice(Arc::clone(&first_app), query, lines)).buffered(at_once);
     let slices = first.flat_map(move |first| {
         let app = Arc::clone(&next_app);
@@ -401,11 +406,11 @@ fn answers(app: Arc<App>, query: BatchQuery, body: Body) -> impl Stream<Item = B
         counted.lock().answered += count;
         part
     });
-    // Made when all lines before it have been given out.
+    // The last line is made after all other lines were sent.
     parts.chain(stream::once(async move { ending.lock().line().into() }))
 }
 
-/// A body whose beginning, or all of it, has arrived.
+/// Reads the first bytes of a body, or all of it.
 async fn read_ahead(app: &App, body: Body) -> Result<Body, Problem> {
     let mut pieces = body.into_data_stream();
     let (mut read, mut bytes) = (Vec::new(), 0);
@@ -415,7 +420,7 @@ async fn read_ahead(app: &App, body: Body) -> Result<Body, Problem> {
             next = tokio::time::timeout_at(deadline.at, pieces.next()) => next,
             () = app.pool.stopped() => break,
         };
-        // The last line reports what is late or broken.
+        // A timeout or a broken body appears again when the batch reads on.
         let Ok(Some(piece)) = next else { break };
         bytes += piece.as_ref().map_or(0, Bytes::len);
         read.push(piece);
@@ -423,18 +428,18 @@ async fn read_ahead(app: &App, body: Body) -> Result<Body, Problem> {
     Ok(Body::from_stream(stream::iter(read).chain(pieces)))
 }
 
-/// Many design documents, a line each, answered in their order.
+/// Answers many design documents, one a line, in the same order.
 #[utoipa::path(
     post,
     path = "/v1/batch",
     tag = "drive",
     params(BatchQuery),
-    request_body(content = String, content_type = "application/x-ndjson", description = "A design document a line. Lines are answered while others are still sent: read answers while you send, or send no more than 8 MiB ahead of them."),
+    request_body(content = String, content_type = "application/x-ndjson", description = "One design document a line. The response begins before the request ends: read answers while you send, or send at most 8 MiB ahead of them."),
     responses(
-        (status = 200, description = "A line a document, in their order, each `{\"index\", \"status\", \"answer\"}` or `{\"index\", \"status\", \"problem\"}`; then a last one, `{\"asked\", \"answered\"}`, with a `problem` where the batch broke off.", body = BatchLine<SweepAnswer>, content_type = "application/x-ndjson"),
-        (status = 400, description = "A query that the batch does not know.", body = Problem, content_type = "application/problem+json"),
-        (status = 415, description = "The body is not sent as NDJSON.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "As many batches run as the service admits; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 200, description = "One line for each document, in the same order: `{\"index\", \"status\", \"answer\"}` or `{\"index\", \"status\", \"problem\"}`. The last line is `{\"asked\", \"answered\"}`, with a `problem` if the batch ended early.", body = BatchLine<SweepAnswer>, content_type = "application/x-ndjson"),
+        (status = 400, description = "The query parameter is unknown or invalid.", body = Problem, content_type = "application/problem+json"),
+        (status = 415, description = "The body is not `application/x-ndjson`.", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "The limit of running batches is reached. `Retry-After` has the seconds until a retry.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn batch(State(app): State<Arc<App>>, request: Request) -> Response {
@@ -450,7 +455,7 @@ async fn begin(app: Arc<App>, request: Request) -> Result<Response, Problem> {
     let body = request.into_body();
     let body = if is_behind_proxy { read_ahead(&app, body).await? } else { body };
     let answers = answers(app, query, body).map(move |line| {
-        // Until the last line is sent or the client has left.
+        // The permit is held until the last line is sent or the client leaves.
         let _held = &place;
         Ok::<_, io::Error>(line)
     });

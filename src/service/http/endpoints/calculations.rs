@@ -1,4 +1,5 @@
-//! `POST /v1/geometry`, `/v1/coincidence-degree`, `/v1/sweep` and `/v1/accuracy`: each puts one question to one design document.
+//! `POST /v1/geometry`, `/v1/coincidence-degree`, `/v1/sweep` and `/v1/accuracy`: one calculation for one design
+//! document.
 
 use std::sync::Arc;
 
@@ -15,17 +16,17 @@ use toothwave_calculation::sweep::answer::SweepAnswer;
 use crate::app::App;
 use crate::http::answer::{Problems, respond, respond_uncached};
 
-/// The mating parts' profiles and what a designer decides by.
+/// Computes the profiles of the mating parts and the key figures of the geometry.
 #[utoipa::path(
     post,
     path = "/v1/geometry",
     tag = "drive",
-    request_body(content = Design, description = "Reads `drive` and `profile`."),
-    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
+    request_body(content = Design, description = "A design document. This endpoint reads `drive` and `profile`."),
+    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
     responses(
-        (status = 200, description = "The geometry.", 
+        (status = 200, description = "The profiles and key figures.", 
             content((GeometryAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))),
-        (status = 304, description = "The client has this representation already (`If-None-Match`)."),
+        (status = 304, description = "The client already has this representation (`If-None-Match`)."),
         Problems
     )
 )]
@@ -33,17 +34,17 @@ pub async fn geometry(State(app): State<Arc<App>>, request: Request) -> Response
     respond(Geometry, app, request).await
 }
 
-/// How many teeth share the load.
+/// Computes the contact ratio (coincidence degree): how many teeth share the load.
 #[utoipa::path(
     post,
     path = "/v1/coincidence-degree",
     tag = "drive",
-    request_body(content = Design, description = "Reads `drive`."),
-    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
+    request_body(content = Design, description = "A design document. This endpoint reads `drive`."),
+    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
     responses(
-        (status = 200, description = "The coincidence degree.", 
+        (status = 200, description = "The contact ratio.", 
             content((CoincidenceDegreeAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))),
-        (status = 304, description = "The client has this representation already (`If-None-Match`)."),
+        (status = 304, description = "The client already has this representation (`If-None-Match`)."),
         Problems
     )
 )]
@@ -51,17 +52,17 @@ pub async fn coincidence_degree(State(app): State<Arc<App>>, request: Request) -
     respond(CoincidenceDegree, app, request).await
 }
 
-/// Forces and contact stresses over one period.
+/// Computes forces and contact stresses over one period.
 #[utoipa::path(
     post,
     path = "/v1/sweep",
     tag = "drive",
-    request_body(content = Design, description = "Reads all but `profile`; `load` is required."),
-    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
+    request_body(content = Design, description = "A design document. This endpoint reads all of it except `profile`. `load` is required."),
+    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
     responses(
-        (status = 200, description = "The sweep. As CSV one line a state, with the names of the columns of `states`; as an Apache Arrow stream the same columns; as text a summary; as SVG its plots.",
+        (status = 200, description = "The sweep. CSV has one line for each state and the columns of `states`. The Apache Arrow stream has the same columns. Text is a summary, and SVG has the plots.",
             content((SweepAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"), (String = "application/vnd.apache.arrow.stream"), (String = "image/svg+xml"))),
-        (status = 304, description = "The client has this representation already (`If-None-Match`)."),
+        (status = 304, description = "The client already has this representation (`If-None-Match`)."),
         Problems
     )
 )]
@@ -69,14 +70,15 @@ pub async fn sweep(State(app): State<Arc<App>>, request: Request) -> Response {
     respond(Sweep, app, request).await
 }
 
-/// How wrong and how slow each way of computing a design is, measured there and then beside whatever else the service does; never cached.
+/// Measures the error and the time of each computation method.
+/// The result depends on the load of the machine and is never cached.
 #[utoipa::path(
     post,
     path = "/v1/accuracy",
     tag = "drive",
-    request_body(content = Design, description = "Reads `drive`, `materials`, `load`, `model` and `accuracy`; `load` is required."),
+    request_body(content = Design, description = "A design document. This endpoint reads `drive`, `materials`, `load`, `model` and `accuracy`. `load` is required."),
     params(CsvOptions),
-    responses((status = 200, description = "The ways, each with its error and its time.",
+    responses((status = 200, description = "The methods, each with its error and its time.",
         content((AccuracyAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))), Problems)
 )]
 pub async fn accuracy(State(app): State<Arc<App>>, request: Request) -> Response {

@@ -1,4 +1,5 @@
-//! `POST /v1/design`: all that is known of a design in one answer, for whoever shows a design while it changes.
+//! `POST /v1/design`: geometry, contact ratio and sweep of a design in one answer, for programs that show a design
+//! while it changes.
 
 use std::sync::Arc;
 
@@ -20,37 +21,37 @@ use crate::app::App;
 use crate::http::answer::{Problems, respond};
 use crate::http::problem::Problem;
 
-/// Each answer about a design, as its own endpoint has it, or the problem in its place.
+/// Answers of three endpoints for one design. If an answer is missing, `problems` has the reason.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct DesignAnswer {
-    /// What `/v1/geometry` answers.
+    /// Answer of `/v1/geometry`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub geometry: Option<GeometryAnswer>,
-    /// What `/v1/coincidence-degree` answers.
+    /// Answer of `/v1/coincidence-degree`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub coincidence_degree: Option<CoincidenceDegreeAnswer>,
-    /// What `/v1/sweep` answers.
+    /// Answer of `/v1/sweep`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub sweep: Option<SweepAnswer>,
-    /// Why the others have none.
+    /// Problems of the missing answers.
     pub problems: DesignProblems,
 }
 
-/// The problems that the endpoints of those names would have answered with.
+/// Problems, each as its own endpoint would return it.
 #[derive(Debug, Default, Serialize, ToSchema)]
 pub struct DesignProblems {
-    /// Why there is no geometry.
+    /// Problem of the geometry.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub geometry: Option<Problem>,
-    /// Why there is no coincidence degree.
+    /// Problem of the contact ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub coincidence_degree: Option<Problem>,
-    /// Why there is no sweep.
+    /// Problem of the sweep.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub sweep: Option<Problem>,
@@ -70,14 +71,14 @@ impl Forms for DesignAnswer {
     }
 }
 
-/// What is asked, within limits that are part of the answer: where a sweep is beyond them it says so.
+/// The question of `/v1/design`. The limits are part of the answer: a sweep above them has a problem.
 #[derive(Debug)]
 pub struct WholeDesign(pub Limits);
 
-/// The parameters of one question, or why it has no answer.
+/// The parameters of one calculation, or the reason why it has no answer.
 type Checked<Q> = Result<<Q as Question>::Checked, NoAnswer>;
 
-/// Of each question.
+/// The checked parameters of all three calculations.
 #[derive(Debug)]
 pub struct CheckedDesign {
     geometry: Checked<Geometry>,
@@ -128,7 +129,8 @@ impl Question for WholeDesign {
     }
 }
 
-/// One answer, or nothing and its problem. What is no property of the design fails the whole.
+/// Returns one answer, or none and sets its problem. An error that is no property of the design fails the whole
+/// request.
 fn part<Q: Question>(
     checked: &Checked<Q>,
     stop: &dyn Stop,
@@ -145,17 +147,17 @@ fn part<Q: Question>(
     }
 }
 
-/// Geometry, coincidence degree and sweep in one answer.
+/// Computes geometry, contact ratio and sweep in one answer.
 #[utoipa::path(
     post,
     path = "/v1/design",
     tag = "drive",
-    request_body(content = Design, description = "Reads all of it."),
-    params(("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")),
+    request_body(content = Design, description = "A design document. This endpoint reads all of it."),
+    params(("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
     responses(
-        (status = 200, description = "Each answer that there is, and of the others the problem: also where there is none at all.",
+        (status = 200, description = "The answers, and a problem for each missing one. The status is 200 even if all answers are missing.",
             body = DesignAnswer, content_type = "application/json"),
-        (status = 304, description = "The client has this representation already (`If-None-Match`)."),
+        (status = 304, description = "The client already has this representation (`If-None-Match`)."),
         Problems
     )
 )]

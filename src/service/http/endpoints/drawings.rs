@@ -1,4 +1,4 @@
-//! `POST /v1/drawings/{part}`: each mating part, or all of them in place, as outlines for CAD, workshops and eyes.
+//! `POST /v1/drawings/{part}`: outlines of one part or of the assembly.
 
 use std::sync::Arc;
 
@@ -17,22 +17,22 @@ use crate::http::answer::{Problems, respond};
 use crate::http::negotiation::query;
 use crate::http::problem::{Problem, ProblemCode};
 
-/// The sections of a part, or of all parts in place.
+/// Draws the sections of one part, or of the assembly.
 #[utoipa::path(
     post,
     path = "/v1/drawings/{part}",
     tag = "drive",
-    request_body(content = Design, description = "Reads `drive`, `parts` and `profile.chord_tolerance_mm`, for `assembly` also `assembly`."),
+    request_body(content = Design, description = "A design document. This endpoint reads `drive`, `parts` and `profile.chord_tolerance_mm`; the part `assembly` also reads `assembly`."),
     params(
-        ("part" = DrawnPart, Path, description = "What is drawn.", example = "ring"),
+        ("part" = DrawnPart, Path, description = "The part.", example = "ring"),
         DrawingOptions,
-        ("If-None-Match" = Option<String>, Header, description = "Entity tags that the client has.")
+        ("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")
     ),
     responses(
-        (status = 200, description = "The drawing. As DXF (AutoCAD 2000, millimetres) a layer a part, every outline a circle or one closed polyline of lines and arcs, true to the chord tolerance; as SVG the same in millimetres; as STEP (AP214) every prism a solid in place, circles as cylinders, other curves as polynomials; as 3MF and STL closed meshes, true to the chord tolerance.",
+        (status = 200, description = "The drawing. DXF (AutoCAD 2000, millimetres) has one layer for each part; an outline is a circle or a closed polyline of lines and arcs, true to the chord tolerance. SVG has the same in millimetres. STEP (AP214) has one solid for each prism, in its position; circles are cylinders, other curves are polynomials. 3MF and STL have closed meshes, true to the chord tolerance.",
             content((DrawingAnswer = "application/json"), (String = "image/svg+xml"), (String = "image/vnd.dxf"), (String = "model/step"), (String = "model/3mf"), (String = "model/stl"))),
-        (status = 304, description = "The client has this representation already (`If-None-Match`)."),
-        (status = 404, description = "No such part.", body = Problem, content_type = "application/problem+json"),
+        (status = 304, description = "The client already has this representation (`If-None-Match`)."),
+        (status = 404, description = "The part is unknown.", body = Problem, content_type = "application/problem+json"),
         Problems
     )
 )]
@@ -43,7 +43,7 @@ pub async fn drawing(
 ) -> Response {
     let Ok(Path(part)) = part else {
         let known: Vec<_> = DrawnPart::ALL.iter().map(json::word).collect();
-        let detail = format!("drawings there are of {}", known.join(", "));
+        let detail = format!("the part is unknown. Use one of: {}", known.join(", "));
         return Problem::new(ProblemCode::NotFound, detail).into_response();
     };
     let DrawingOptions { preset } = match query(request.uri()) {

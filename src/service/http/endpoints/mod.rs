@@ -1,9 +1,8 @@
-//! The endpoints: each handler with its description in the API document.
+//! The endpoints: handlers with their descriptions for the API document.
 
 pub mod batch;
 pub mod calculations;
 pub mod design;
 pub mod drawings;
-pub mod peaks;
 pub mod service;
 pub mod studies;

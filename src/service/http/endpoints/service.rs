@@ -1,4 +1,4 @@
-//! Limits, examples, materials, health, metrics.
+//! Endpoints for limits, examples, materials, health and metrics.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -19,31 +19,31 @@ use crate::http::problem::{Problem, ProblemCode};
 use crate::ops::config::Limits;
 use crate::ops::metrics;
 
-/// The limits of this service.
+/// Returns the limits of this service.
 #[utoipa::path(get, path = "/v1/limits", tag = "service", responses((status = 200, description = "The limits.", body = Limits)))]
 pub async fn limits(State(app): State<Arc<App>>) -> Json<Limits> {
     Json(app.limits)
 }
 
-/// The ready design documents.
+/// List of the example design documents.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct ExamplesAnswer {
-    /// All of them.
+    /// The examples.
     pub examples: Vec<ExampleAnswer>,
 }
 
-/// A ready design document.
+/// An example design document.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct ExampleAnswer {
-    /// Its name.
+    /// Name in the path.
     pub name: &'static str,
-    /// What it shows.
+    /// Short description.
     pub title: &'static str,
-    /// Where it stands.
+    /// Path of the document.
     pub href: String,
 }
 
-/// The ready design documents by name.
+/// Lists the example design documents.
 #[utoipa::path(get, path = "/v1/examples", tag = "service", responses((status = 200, description = "The examples.", body = ExamplesAnswer)))]
 pub async fn examples() -> Json<ExamplesAnswer> {
     let examples = EXAMPLES.iter().map(|example| ExampleAnswer {
@@ -54,57 +54,57 @@ pub async fn examples() -> Json<ExamplesAnswer> {
     Json(ExamplesAnswer { examples: examples.collect() })
 }
 
-/// Materials that designers know by name.
+/// List of the named materials.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct MaterialsAnswer {
-    /// All of them.
+    /// The materials.
     pub materials: &'static [MaterialPreset],
 }
 
-/// Materials by name, each number with its published source, to be copied into a design document.
+/// Lists materials by name, to copy into a design document. Each number has its published source.
 #[utoipa::path(get, path = "/v1/materials", tag = "service", responses((status = 200, description = "The materials.", body = MaterialsAnswer)))]
 pub async fn materials() -> Json<MaterialsAnswer> {
     Json(MaterialsAnswer { materials: &MATERIALS })
 }
 
-/// One ready design document, to be sent to any endpoint as it is.
+/// Returns an example design document. Every endpoint accepts it unchanged.
 #[utoipa::path(
     get,
     path = "/v1/examples/{name}",
     tag = "service",
-    params(("name" = String, Path, description = "As in `/v1/examples`.", example = "paper-5.1")),
+    params(("name" = String, Path, description = "Name from `/v1/examples`.", example = "paper-5.1")),
     responses(
-        (status = 200, description = "The document.", body = Design),
+        (status = 200, description = "The design document.", body = Design),
         (status = 404, description = "No example has this name.", body = Problem, content_type = "application/problem+json")
     )
 )]
 pub async fn example(name: Result<Path<String>, PathRejection>) -> Response {
-    // A name that is no text is no example's either.
+    // A path segment that is not UTF-8 is an unknown name.
     let name = name.map(|Path(name)| name).unwrap_or_default();
     match examples::by_name(&name) {
         Some(example) => ([(header::CONTENT_TYPE, "application/json")], example.document).into_response(),
         None => {
             let names: Vec<_> = EXAMPLES.iter().map(|example| example.name).collect();
-            let detail = format!("no example is called `{name}`; there are {}", names.join(", "));
+            let detail = format!("there is no example `{name}`. Use one of: {}", names.join(", "));
             Problem::new(ProblemCode::NotFound, detail).into_response()
         }
     }
 }
 
-/// The process answers.
-#[utoipa::path(get, path = "/health/live", tag = "service", responses((status = 200, description = "It does.", body = String, content_type = "text/plain")))]
+/// Checks that the process answers.
+#[utoipa::path(get, path = "/health/live", tag = "service", responses((status = 200, description = "The process answers.", body = String, content_type = "text/plain")))]
 pub async fn live() -> &'static str {
     "live\n"
 }
 
-/// The service wants requests.
+/// Checks that the service accepts requests.
 #[utoipa::path(
     get,
     path = "/health/ready",
     tag = "service",
     responses(
-        (status = 200, description = "It does.", body = String, content_type = "text/plain"),
-        (status = 503, description = "It is shutting down.", body = String, content_type = "text/plain")
+        (status = 200, description = "The service accepts requests.", body = String, content_type = "text/plain"),
+        (status = 503, description = "The service is stopping.", body = String, content_type = "text/plain")
     )
 )]
 pub async fn ready(State(app): State<Arc<App>>) -> (StatusCode, &'static str) {
@@ -115,7 +115,7 @@ pub async fn ready(State(app): State<Arc<App>>) -> (StatusCode, &'static str) {
     }
 }
 
-/// Metrics in Prometheus' text format.
+/// Returns metrics in the Prometheus text format.
 #[utoipa::path(get, path = "/metrics", tag = "service", responses((status = 200, description = "The metrics.", body = String, content_type = "text/plain")))]
 pub async fn metrics(State(app): State<Arc<App>>) -> Response {
     let content_type = [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")];

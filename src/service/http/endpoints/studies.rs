@@ -1,4 +1,4 @@
-//! `/v1/studies`: many variants of one design, and `/v1/quantities`, what can be asked of them.
+//! `/v1/studies`: many variants of one design. `/v1/quantities`: the quantities that a study can return.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -28,42 +28,42 @@ use crate::http::negotiation::{self, Representation};
 use crate::http::problem::{Problem, ProblemCode};
 use crate::studies::{StudyRecord, StudyResource, StudyState};
 
-/// A header of the request (RFC 7240).
+/// Request header with preferences (RFC 7240).
 const PREFER: HeaderName = HeaderName::from_static("prefer");
-/// The header of the response that says which preference was followed (RFC 7240).
+/// Response header with the applied preference (RFC 7240).
 pub const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
 
-/// Time between two events of a study.
+/// Shortest time between two events of a study.
 const EVENT_PAUSE: Duration = Duration::from_millis(100);
 
-/// After this time without an event a comment is sent. A chunk may take minutes, and proxies close silent connections.
+/// Interval of keep-alive comments. A chunk may take minutes, and proxies close silent connections.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
-/// Every quantity that a study can be asked for.
+/// List of the quantities of studies.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct QuantitiesAnswer {
-    /// All of them.
+    /// The quantities.
     pub quantities: &'static [Quantity],
 }
 
-/// Every quantity that a study can be asked for, with unit, meaning and where it comes from.
+/// Lists the quantities that a study can return, with unit, meaning and source.
 #[utoipa::path(get, path = "/v1/quantities", tag = "studies", responses((status = 200, description = "The quantities.", body = QuantitiesAnswer)))]
 pub async fn quantities() -> Json<QuantitiesAnswer> {
     Json(QuantitiesAnswer { quantities: &QUANTITIES })
 }
 
-/// A study: many variants of one design, looked at in the background.
+/// Starts a study: many variants of one design, computed in the background.
 #[utoipa::path(
     post,
     path = "/v1/studies",
     tag = "studies",
-    request_body(content = StudyDocument, description = "What is asked. The same question is the same study: it is found again, or goes on where it was cancelled."),
-    params(("Prefer" = Option<String>, Header, description = "RFC 7240: `wait=N` to be answered when the study is done, if that is within N seconds and within the service's deadline.")),
+    request_body(content = StudyDocument, description = "A study document. The same document is the same study: a finished one is returned, a cancelled one continues."),
+    params(("Prefer" = Option<String>, Header, description = "RFC 7240: with `wait=N` the response waits for the end of the study, at most N seconds and at most the service's deadline.")),
     responses(
-        (status = 200, description = "The study does not run any more; with its result, as far as it has come.", body = StudyResource),
-        (status = 202, description = "It runs; `Location` says where it stands, relative to this path.", body = StudyResource, headers(("Location" = String, description = "The study."))),
+        (status = 200, description = "The study has ended. The response has its result, which may be partial.", body = StudyResource),
+        (status = 202, description = "The study runs. `Location` has its path.", body = StudyResource, headers(("Location" = String, description = "Path of the study, relative to this path."))),
         Problems,
-        (status = 404, description = "It was forgotten before it was answered: others took its room, or deleted it. Ask again.", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "The study was removed before the response: by a client, or to free memory for another study. Request it again.", body = Problem, content_type = "application/problem+json"),
         (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json")
     )
 )]
@@ -71,15 +71,15 @@ pub async fn begin(State(app): State<Arc<App>>, request: Request) -> Response {
     respond_with_study(&app, request).await.unwrap_or_else(IntoResponse::into_response)
 }
 
-/// How a study stands.
+/// Returns the state of a study.
 #[utoipa::path(
     get,
     path = "/v1/studies/{id}",
     tag = "studies",
-    params(("id" = String, Path, description = "As the study's `id`.")),
+    params(("id" = String, Path, description = "The `id` of the study.")),
     responses(
-        (status = 200, description = "It.", body = StudyResource),
-        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "The study.", body = StudyResource),
+        (status = 404, description = "There is no study with this id.", body = Problem, content_type = "application/problem+json"),
         (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json"),
     )
 )]
@@ -90,17 +90,18 @@ pub async fn study(State(app): State<Arc<App>>, id: Result<Path<String>, PathRej
     }
 }
 
-/// Cancels a study that runs: what it has come to is kept, and the same question lets it go on. One that does not run is forgotten.
+/// Cancels a running study, or removes one that has ended.
+/// A cancelled study keeps its parts. The same study document continues it.
 #[utoipa::path(
     delete,
     path = "/v1/studies/{id}",
     tag = "studies",
-    params(("id" = String, Path, description = "As the study's `id`.")),
+    params(("id" = String, Path, description = "The `id` of the study.")),
     responses(
-        (status = 204, description = "It does not run any more, or is forgotten."),
-        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 204, description = "The study is cancelled or removed."),
+        (status = 404, description = "There is no study with this id.", body = Problem, content_type = "application/problem+json"),
         (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The file of studies cannot be written now; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 503, description = "The database file of the studies cannot be written. `Retry-After` has the seconds until a retry.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRejection>) -> Response {
@@ -113,20 +114,20 @@ pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
     }
 }
 
-/// What a study has come to: whole, or as far as it has come.
+/// Returns the result of a study. It is partial if the study has not finished.
 #[utoipa::path(
     get,
     path = "/v1/studies/{id}/result",
     tag = "studies",
-    params(CsvOptions, ("id" = String, Path, description = "As the study's `id`.")),
+    params(CsvOptions, ("id" = String, Path, description = "The `id` of the study.")),
     responses(
-        (status = 200, description = "The result; `is_complete` says whether it is whole. As CSV a line each of what the study is about; as Apache Parquet the same columns.",
+        (status = 200, description = "The result. `is_complete` is true if all variants are computed. CSV has one line for each row of the study; Apache Parquet has the same columns.",
             content((StudyAnswer = "application/json"), (String = "text/csv"), (String = "application/vnd.apache.parquet"))),
-        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "There is no study with this id.", body = Problem, content_type = "application/problem+json"),
         (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json"),
-        (status = 406, description = "No representation that the client accepts.", body = Problem, content_type = "application/problem+json"),
-        (status = 500, description = "What is kept of the study is damaged, or the service itself failed.", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "The service is full, the deadline stopped the computation, or the file of studies cannot be read now; `Retry-After` says when to try again.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
+        (status = 406, description = "The client accepts no available representation.", body = Problem, content_type = "application/problem+json"),
+        (status = 500, description = "The stored study is damaged, or the service has an internal error.", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "The service is full, the deadline stopped the computation, or the database file of the studies cannot be read. `Retry-After` has the seconds until a retry.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
 pub async fn result(
@@ -148,9 +149,9 @@ pub async fn result(
 #[derive(Debug, ToSchema)]
 #[expect(dead_code, reason = "for the API document: axum writes its lines")]
 pub struct StudyEvent {
-    /// `progress` while it runs, then `end`.
+    /// `progress` while the study runs, then `end`.
     event: EventName,
-    /// The study as it stands, as JSON.
+    /// The current state of the study, as JSON.
     data: String,
 }
 
@@ -158,21 +159,22 @@ pub struct StudyEvent {
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EventName {
-    /// It runs.
+    /// The study runs.
     Progress,
-    /// It is over.
+    /// The study has ended.
     End,
 }
 
-/// A study's progress as server-sent events: `progress` while it runs, then `end`. Each holds the study as it stands.
+/// Streams the progress of a study as server-sent events.
+/// The events are `progress` while the study runs, then `end`. Each has the current state of the study.
 #[utoipa::path(
     get,
     path = "/v1/studies/{id}/events",
     tag = "studies",
-    params(("id" = String, Path, description = "As the study's `id`.")),
+    params(("id" = String, Path, description = "The `id` of the study.")),
     responses(
-        (status = 200, description = "The events; they end when the study does.", body = StudyEvent, content_type = "text/event-stream"),
-        (status = 404, description = "No such study is kept.", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "The events. The stream ends with the study.", body = StudyEvent, content_type = "text/event-stream"),
+        (status = 404, description = "There is no study with this id.", body = Problem, content_type = "application/problem+json"),
         (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json"),
     )
 )]
@@ -181,7 +183,7 @@ pub async fn events(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
         Ok(record) => record,
         Err(problem) => return problem.into_response(),
     };
-    // The state at once, and then after each change.
+    // The first event has the current state; each further one follows a change.
     let events = stream::unfold(Some((record, None)), move |next| {
         let app = Arc::clone(&app);
         async move {
@@ -219,12 +221,12 @@ fn find(app: &App, id: Result<Path<String>, PathRejection>) -> Result<Arc<StudyR
     app.studies.find(&id)?.ok_or_else(|| no_such_study(&id))
 }
 
-/// The id of a path. One that is no text is as unknown as the empty one.
+/// Returns the id of a path. An id that is not UTF-8 becomes the empty id, which is unknown.
 fn id_of(id: Result<Path<String>, PathRejection>) -> String {
     id.map(|Path(id)| id).unwrap_or_default()
 }
 
-/// Completes a change even if the client leaves meanwhile.
+/// Completes a change even if the client leaves.
 async fn complete_change<T: Send + 'static, F: Future<Output = Result<T, Problem>> + Send + 'static>(
     app: &Arc<App>,
     change: impl FnOnce(Arc<App>) -> F,
@@ -234,8 +236,7 @@ async fn complete_change<T: Send + 'static, F: Future<Output = Result<T, Problem
 }
 
 fn no_such_study(id: &str) -> Problem {
-    let detail =
-        format!("this service has no study `{id}`: it was never requested here, or was removed. Request it again");
+    let detail = format!("there is no study `{id}`: it was never requested here, or was removed. Request it again");
     Problem::new(ProblemCode::NotFound, detail)
 }
 
@@ -247,7 +248,7 @@ async fn respond_with_study(app: &Arc<App>, request: Request) -> Result<Response
     let representation = Representation::negotiate(&headers, std::iter::empty())?;
     let text = read_body(app, deadline, &headers, body).await?.to_vec();
     let limits = app.limits.of_studies();
-    // A document of 64 KB can take long to read, because its choices are hundreds of designs.
+    // A document of 64 KB can take long to parse, because its choices are hundreds of designs.
     let read = move |_: &AtomicBool| Ok((Study::read(&text, &limits)?, text));
     let (study, text) = within(deadline, app.pool.run(read)).await?;
     let record = complete_change(app, async move |app| app.studies.begin(study, &text).await).await?;
@@ -276,7 +277,7 @@ async fn respond_with_study(app: &Arc<App>, request: Request) -> Result<Response
     Ok(no_store(response))
 }
 
-/// The seconds of `wait=N`, where the request has that.
+/// Returns the time of the preference `wait=N`.
 fn wait_wanted(headers: &HeaderMap) -> Option<Duration> {
     let preferences = headers.get_all(PREFER).iter().filter_map(|value| value.to_str().ok());
     preferences.flat_map(|list| list.split([',', ';'])).find_map(|preference| {
@@ -284,13 +285,13 @@ fn wait_wanted(headers: &HeaderMap) -> Option<Duration> {
         let seconds = value.trim().trim_matches('"');
         let is_number = !seconds.is_empty() && seconds.bytes().all(|byte| byte.is_ascii_digit());
         let seconds = is_number.then(|| seconds.parse::<u64>().unwrap_or(u64::MAX))?;
-        // So long that nothing is waited for longer, so short that it can be added to any time.
+        // The cap fits into every time type and exceeds every deadline.
         let seconds = seconds.min(u64::from(u32::MAX));
         name.trim().eq_ignore_ascii_case("wait").then(|| Duration::from_secs(seconds))
     })
 }
 
-/// The response with a study's answer, in the view of it that the request wants.
+/// Returns the response with a study's answer, wrapped by `view`.
 async fn answer_response<A: Forms + Send>(
     app: &Arc<App>,
     record: &Arc<StudyRecord>,

@@ -1,15 +1,16 @@
-//! Wave generators other than ellipses: mesh and load follow from `d`, `T` and `T_ψ` of the teeth's centres alone (docs/theory.md sections 2.9 and 3).
+//! Wave generators other than ellipses. Mesh and load follow from `d`, `T` and `T_ψ` of the teeth's centres
+//! (docs/explanation/theory.md sections 2.9 and 3).
 
 use super::lanes::LANES;
 use crate::cam::{Harmonic, HarmonicPath};
 
-/// Newton's steps towards a normal at most. A drive that needs more goes the plain way.
+/// Largest number of Newton steps towards a normal. A drive that needs more uses the plain path.
 const MAX_STEPS: u32 = 8;
 
-/// A relative step this small is the last: the next one would be of its square.
+/// A relative step this small is the last: the next would be proportional to its square.
 const LAST_STEP: f64 = 1e-9;
 
-/// Where the centres of a stretch of teeth stand.
+/// Centres of a chunk of teeth.
 pub(super) struct CenterLanes {
     /// `d`.
     pub(super) radius_mm: [f64; LANES],
@@ -33,13 +34,14 @@ impl CenterLanes {
     }
 }
 
-/// What tells the centres from the sines and the cosines of the phases `Uψ/2`.
+/// Computes the centres from the sines and cosines of the phases `Uψ/2`.
 pub(super) trait Centers {
-    /// Nothing where that takes too many steps.
+    /// Returns the centres; none if that takes too many steps.
     fn at(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<CenterLanes>;
 }
 
-/// The circle of radius `R0` about a point e beside the axis: the centres run on the circle of radius `P0 = R0 + r` about it.
+/// A circle of radius `R0` at a distance e from the axis. The centres move on a circle of radius `P0 = R0 + r` about
+/// its centre.
 pub(super) struct EccentricCenters {
     path_mm: f64,
     eccentricity_mm: f64,
@@ -47,7 +49,7 @@ pub(super) struct EccentricCenters {
 }
 
 impl EccentricCenters {
-    /// Of the harmonic support with one lobe.
+    /// Returns the centres of a harmonic support with one lobe.
     pub(super) fn new(cam: &Harmonic, tooth_radius_mm: f64) -> Self {
         Self {
             path_mm: cam.mean_radius_mm() + tooth_radius_mm,
@@ -58,8 +60,8 @@ impl EccentricCenters {
 }
 
 impl Centers for EccentricCenters {
-    /// With `w = √(P0² - e² sin²ψ)`, the centre's distance from that point along the position: `d = w + e cos ψ`, `T = e sin ψ/w`,
-    /// `T_ψ = e cos ψ P0²/w³`.
+    /// With `w = √(P0² - e² sin²ψ)`, the centre's distance from the circle's centre along the position:
+    /// `d = w + e cos ψ`, `T = e sin ψ/w`, `T_ψ = e cos ψ P0²/w³`.
     #[inline(always)]
     fn at(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<CenterLanes> {
         let Self { path_mm, eccentricity_mm: e, curvature_per_mm } = *self;
@@ -102,8 +104,8 @@ impl HarmonicPathCenters {
 }
 
 impl Centers for HarmonicPathCenters {
-    /// `T = eU sin(Uψ)/d`, `T_ψ = eU² cos(Uψ)/d + T²`, and the path's curvature `κ_C = (1 + T² + T_ψ)/(d (1 + T²)^1.5)`, of which the two parts make
-    /// `1/ρ_H = κ_C/(1 - rκ_C)` too.
+    /// `T = eU sin(Uψ)/d`, `T_ψ = eU² cos(Uψ)/d + T²`, and the path's curvature
+    /// `κ_C = (1 + T² + T_ψ)/(d (1 + T²)^1.5)`. Its two factors also give `1/ρ_H = κ_C/(1 - rκ_C)`.
     #[inline(always)]
     fn at(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<CenterLanes> {
         let Self { mean_radius_mm, amplitude_mm, slope_mm, bend_mm, tooth_radius_mm } = *self;
@@ -125,7 +127,7 @@ impl Centers for HarmonicPathCenters {
     }
 }
 
-/// The support `h = R0 + e cos Uφ` with two lobes or more, of which the normal `φ = ψ + γ` is looked for.
+/// The support `h = R0 + e cos Uφ` with two lobes or more, whose normal `φ = ψ + γ` is computed iteratively.
 pub(super) struct HarmonicCenters {
     lobes: u32,
     mean_radius_mm: f64,
@@ -143,7 +145,7 @@ impl HarmonicCenters {
         }
     }
 
-    /// `sin Uφ` and `cos Uφ`, from those of `Uψ` and from `tan γ`: `cos γ + i sin γ` to the power of U.
+    /// Returns `sin Uφ` and `cos Uφ`, from those of `Uψ` and from `tan γ`, by the power U of `cos γ + i sin γ`.
     #[inline(always)]
     fn phases(&self, of_lobe: &[[f64; LANES]; 2], tan: &[f64; LANES]) -> [[f64; LANES]; 2] {
         let (mut cos_gamma, mut sin_gamma) = ([0.0; LANES], [0.0; LANES]);
@@ -164,7 +166,8 @@ impl HarmonicCenters {
 }
 
 impl Centers for HarmonicCenters {
-    /// Newton's method for `T (P0 + e cos Uφ) = eU sin Uφ`; then `ρ_H = R0 - e(U² - 1) cos Uφ` and `T_ψ = (1 + T²)(T h' - h'')/(r + ρ_H)`.
+    /// Newton's method for `T (P0 + e cos Uφ) = eU sin Uφ`. Then `ρ_H = R0 - e(U² - 1) cos Uφ` and
+    /// `T_ψ = (1 + T²)(T h' - h'')/(r + ρ_H)`.
     #[inline(always)]
     fn at(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<CenterLanes> {
         let Self { mean_radius_mm, amplitude_mm: e, tooth_radius_mm: r, .. } = *self;
@@ -178,7 +181,7 @@ impl Centers for HarmonicCenters {
         let of_lobe = [of_lobe_sin, of_lobe_cos];
         let mut lanes = CenterLanes::new();
         let mut is_found = false;
-        // The first step is from γ = 0.
+        // The first step starts at γ = 0.
         let mut phases = of_lobe;
         for _ in 0..MAX_STEPS {
             let mut largest = [0.0; LANES];
@@ -186,12 +189,12 @@ impl Centers for HarmonicCenters {
             for i in 0..LANES {
                 let (tan, above, lever) = (lanes.tan[i], path_mm + e * cos[i], e * u * sin[i]);
                 let square = 1.0 + tan * tan;
-                // Both sides times what their difference's derivative is divided by.
+                // Both sides are multiplied by the divisor of the derivative of their difference.
                 let value = (tan * above - lever) * square;
                 let slope = above * square - (tan * lever + e * u * u * cos[i]);
                 let step = value / slope;
                 lanes.tan[i] = tan - step;
-                // Lanes beyond the last tooth may stand anywhere.
+                // Lanes beyond the last tooth may have any position.
                 largest[i] = step.abs() - LAST_STEP * lanes.tan[i].abs();
             }
             phases = self.phases(&of_lobe, &lanes.tan);

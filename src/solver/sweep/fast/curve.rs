@@ -1,4 +1,5 @@
-//! Curves that take too long at every state, as sums of Chebyshev polynomials over the range that a drive has of them (docs/theory.md section 9, *Fast path*).
+//! Curves that are too slow to evaluate at every state, as sums of Chebyshev polynomials over a drive's range
+//! (docs/explanation/theory.md section 9, *Fast path*).
 
 use std::f64::consts::PI;
 
@@ -6,34 +7,36 @@ use pulp::Simd;
 
 use super::lanes::{LANES, fused};
 
-/// Polynomials at most. A curve that needs more goes the plain way.
+/// Largest number of polynomials. A curve that needs more uses the plain path.
 const MOST_TERMS: usize = 128;
 
-/// Polynomials to begin with.
+/// Initial number of polynomials.
 const FIRST_TERMS: usize = 8;
 
-/// A curve is known where all that is left out of it adds up to less than this part of its largest value.
+/// A curve is accurate if all omitted terms add up to less than this part of its largest value.
 const LEFT_OUT: f64 = 1e-14;
 
-/// How far a range is widened at either end, as a part of its length: what 33 places of a smooth curve may miss, many times over.
+/// Extension of the range at either end, relative to its length. It is many times what 33 points of a smooth curve may
+/// miss.
 const WIDENED: f64 = 0.25;
 
-/// Half the length of the range of what hardly changes.
+/// Half the length of the range of an almost constant argument.
 const LEAST_HALF_LENGTH: f64 = 1e-3;
 
-/// States summed up together: as many as leave all sums in registers.
+/// States summed together: as many as keep all sums in registers.
 const BLOCK: usize = 8;
 
-/// Some functions of one variable.
+/// Several functions of one variable.
 pub(super) struct Curves<const COUNT: usize> {
     middle: f64,
     half_length: f64,
-    /// By polynomial and then function.
+    /// Coefficients by polynomial and then function.
     coefficients: Vec<[f64; COUNT]>,
 }
 
 impl<const COUNT: usize> Curves<COUNT> {
-    /// Of functions that are smooth around some places, none of which is zero there; nothing where too many polynomials are needed, or a place has no value.
+    /// Builds the curves of functions that are smooth around some points and zero at none. Returns none if too many
+    /// polynomials are needed, or the functions have no value at a point.
     pub(super) fn around(
         places: impl Iterator<Item = f64>,
         functions: impl Fn(f64) -> Option<[f64; COUNT]>,
@@ -45,7 +48,7 @@ impl<const COUNT: usize> Curves<COUNT> {
         let mut intervals = FIRST_TERMS;
         let mut values: Vec<[f64; COUNT]> = Vec::new();
         while intervals <= MOST_TERMS {
-            // Every second node is one of those before.
+            // Every second node is one of the previous nodes.
             values = (0..=intervals)
                 .map(|node| match values.get(node / 2).filter(|_| node % 2 == 0) {
                     Some(known) => Some(*known),
@@ -62,8 +65,8 @@ impl<const COUNT: usize> Curves<COUNT> {
         None
     }
 
-    /// The functions at a stretch of places, by C. W. Clenshaw's recurrence, and the farthest that one of the first `count` places lies from the
-    /// middle of the range, over half its length.
+    /// Returns the functions at a chunk of points, by C. W. Clenshaw's recurrence. Also returns the largest distance of
+    /// the first `count` points from the middle of the range, over half its length.
     #[inline(always)]
     pub(super) fn at<V: Simd>(&self, at: &[f64; LANES], count: usize) -> ([[f64; LANES]; COUNT], f64) {
         let per_half_length = 1.0 / self.half_length;
@@ -103,7 +106,7 @@ impl<const COUNT: usize> Curves<COUNT> {
     }
 }
 
-/// The coefficients of the polynomials through values at `cos(πj/n)`, j from 0 to n.
+/// Returns the coefficients of the polynomials through values at `cos(πj/n)`, j from 0 to n.
 fn coefficients<const COUNT: usize>(values: &[[f64; COUNT]]) -> Vec<[f64; COUNT]> {
     let intervals = values.len() - 1;
     let cosines: Vec<_> = (0..2 * intervals).map(|step| (PI * step as f64 / intervals as f64).cos()).collect();
@@ -120,7 +123,7 @@ fn coefficients<const COUNT: usize>(values: &[[f64; COUNT]]) -> Vec<[f64; COUNT]
         .collect()
 }
 
-/// How many terms say it all; nothing where the last quarter of them is not negligible altogether.
+/// Returns the number of terms needed; none if the last quarter of them is not negligible.
 fn terms_needed<const COUNT: usize>(coefficients: &[[f64; COUNT]]) -> Option<usize> {
     let needed = |function: usize| {
         let allowed = LEFT_OUT * coefficients[0][function].abs();
@@ -160,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn smooth_curves_are_known_to_their_last_digits_on_any_machine() {
+    fn smooth_curves_are_accurate_to_last_digits() {
         assert_right::<pulp::Scalar>();
         #[cfg(target_arch = "x86_64")]
         assert_right::<pulp::x86::V3>();
@@ -169,14 +172,14 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_with_a_corner_or_without_a_value_is_not_known() {
+    fn rejects_curve_with_corner_or_missing_value() {
         assert!(Curves::around([-1.0, 1.0].into_iter(), |x: f64| Some([x.abs()])).is_none());
         assert!(Curves::around([0.5, 1.0].into_iter(), |x: f64| (x > 0.6).then_some([x])).is_none());
         assert!(Curves::around([0.5, 1.0].into_iter(), |_| Some([f64::NAN])).is_none());
     }
 
     #[test]
-    fn a_place_beyond_the_range_is_told_of_unless_no_tooth_stands_there() {
+    fn reports_position_beyond_range_of_present_teeth_only() {
         let curves = Curves::around([1.0, 2.0].into_iter(), |x| Some([x])).expect("a straight line");
         let mut at = [1.5; LANES];
         at[7] = 2.5;

@@ -1,5 +1,6 @@
-//! Where gaps close, in columns (docs/theory.md sections 4.4 and 4.8): the formulas are those of [`crate::gaps`], parted into what the position decides and
-//! what the items have, so that positions that come again in every lap are worked out once.
+//! Closing angles of gaps, in columns (docs/explanation/theory.md sections 4.4 and 4.8). The formulas are those of
+//! [`crate::gaps`], split into a part of the position and a part of the items, so that positions that repeat in every
+//! lap are evaluated once.
 
 use std::f64::consts::PI;
 
@@ -10,40 +11,40 @@ use crate::gaps::{Deviations, Gaps, MM_PER_UM, Modification, RAD_PER_ARCSEC, Tip
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::{Mesh, Place};
 
-/// A total gap that is less than this part of all that it may be the sum of, and not nothing, may be below zero by the plain path's roundings, which decides there.
+/// Relative size below which a nonzero total gap may be negative by rounding. The plain path decides such cases.
 const EDGE: f64 = 1e-12;
 
-/// The gaps of teeth.
+/// Gaps of teeth.
 pub(super) enum GapColumns {
     /// The same at all teeth.
     Uniform { gap_mm: PerContact<f64>, weights: Weights },
-    /// By the position, and by the items that deviate; by virtual work.
+    /// Varying with the position, and with the items that deviate; by virtual work.
     Unlike(Box<UnlikeGaps>),
 }
 
-/// Columns that gaps are worked out in, empty where they are the same at all teeth.
+/// Columns to compute gaps in; empty if gaps are the same at all teeth.
 pub(super) struct GapWork<'a> {
     /// ψ.
     pub(super) from_lobe_rad: &'a mut [f64],
-    /// What the position decides of the total gap.
+    /// Part of the total gap that depends on the position.
     along: &'a mut [f64],
     per_arm: &'a mut [f64],
-    /// Directions of the normals: of the wave generator's against the lobe, of the ring's against its space.
+    /// Directions of the normals: of the wave generator relative to the lobe, of the ring relative to its space.
     cam_cos: &'a mut [f64],
     cam_sin: &'a mut [f64],
     ring_cos: &'a mut [f64],
     ring_sin: &'a mut [f64],
-    /// Of the teeth of a lap, by their places in a row.
+    /// Deviations at the teeth of a lap, by their order in a row.
     items: [&'a mut [f64]; Item::COUNT],
 }
 
-/// What the items of a tooth have.
+/// Deviations of the items at a tooth.
 struct Item {
-    /// Gaps, those of a runout over the direction's cosine and sine.
+    /// Gaps; those of a runout in units of the direction's cosine and sine.
     cam: [f64; 3],
     ring: [f64; 3],
     carrier: f64,
-    /// Turned away about the axis, as lost motion.
+    /// Rotation about the axis, as lost motion.
     lost_motion_rad: f64,
 }
 
@@ -52,12 +53,12 @@ impl Item {
 }
 
 impl<'a> GapWork<'a> {
-    /// Columns of states.
+    /// Number of columns of states.
     pub(super) const COLUMNS: usize = 7;
-    /// Columns of the teeth at an input angle.
+    /// Number of columns of the teeth at an input angle.
     pub(super) const ITEMS: usize = Item::COUNT;
 
-    /// From slices of any length.
+    /// Builds the columns from slices of any length.
     pub(super) fn new(slice: &mut impl FnMut(usize) -> &'a mut [f64], column: usize, teeth: usize) -> Self {
         Self {
             from_lobe_rad: slice(column),
@@ -78,12 +79,12 @@ pub(super) struct UnlikeGaps {
     modification: Modification,
     relief: Option<Relief>,
     deviating: Option<Deviating>,
-    /// What all teeth have alike, which closing angles leave out.
+    /// Lost motion common to all teeth, which closing angles exclude.
     lost_motion_rad: f64,
     tooth_radius_mm: f64,
     ring_teeth_per_wave: f64,
     teeth_per_wave: f64,
-    /// Total gaps between nothing and this are the plain path's.
+    /// Total gaps between zero and this value are left to the plain path.
     edge_mm: f64,
 }
 
@@ -95,7 +96,7 @@ struct Relief {
     power: f64,
 }
 
-/// What single items have.
+/// Deviations of individual items.
 struct Deviating {
     slots: Vec<Slot>,
     spaces: Vec<Space>,
@@ -182,7 +183,7 @@ impl Deviating {
         }
     }
 
-    /// The most that they come to at a tooth, in mm, what is turned at this arm.
+    /// Returns the largest total at a tooth, in mm, with rotations at this arm.
     fn most_mm(&self, arm_mm: f64) -> f64 {
         let sum = |parts: &[f64; 3]| parts.iter().map(|part| part.abs()).sum::<f64>();
         let slots = self.slots.iter().map(|&Slot { thinner_mm, carrier_mm, lost_motion_rad }| {
@@ -195,7 +196,7 @@ impl Deviating {
 }
 
 impl GapColumns {
-    /// Of a drive under a load; none where there is no gap.
+    /// Returns the gaps of a drive under a load; none if there are no gaps.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
         let gaps = loaded.gaps();
         if gaps.is_nil() {
@@ -207,17 +208,17 @@ impl GapColumns {
         }
     }
 
-    /// Whether they are those of single items.
+    /// Returns true if gaps belong to individual items.
     pub(super) fn are_of_items(&self) -> bool {
         matches!(self, Self::Unlike(unlike) if unlike.deviating.is_some())
     }
 
-    /// Whether they are not the same at all teeth.
+    /// Returns true if they are not the same at all teeth.
     pub(super) const fn are_unlike(&self) -> bool {
         matches!(self, Self::Unlike(_))
     }
 
-    /// What all teeth have alike, which closing angles leave out.
+    /// Returns the lost motion common to all teeth, which closing angles exclude.
     pub(super) const fn lost_motion_rad(&self) -> f64 {
         match self {
             Self::Uniform { .. } => 0.0,
@@ -225,7 +226,7 @@ impl GapColumns {
         }
     }
 
-    /// What the places of a tile decide; false where it takes the plain path.
+    /// Computes what depends on the places of a tile. Returns false if it needs the plain path.
     #[inline(always)]
     pub(super) fn prepare(&self, teeth: &Teeth<'_>, gaps: &mut GapWork<'_>, closing: &mut [f64]) -> bool {
         match self {
@@ -240,7 +241,7 @@ impl GapColumns {
         }
     }
 
-    /// Notes which teeth stand in a tile.
+    /// Records the teeth in a tile.
     pub(super) fn set_teeth(&self, mesh: &Mesh, teeth: &LapTeeth, gaps: &mut GapWork<'_>) {
         let Self::Unlike(unlike) = self else { return };
         let Some(deviating) = &unlike.deviating else { return };
@@ -255,7 +256,7 @@ impl GapColumns {
         }
     }
 
-    /// Where the gaps of these teeth close; false where the tile takes the plain path.
+    /// Computes the closing angles of these teeth. Returns false if the tile needs the plain path.
     #[inline(always)]
     pub(super) fn close_at_items(&self, teeth: &Teeth<'_>, gaps: &mut GapWork<'_>, closing: &mut [f64]) -> bool {
         match self {
@@ -265,7 +266,7 @@ impl GapColumns {
     }
 }
 
-/// `g/|h'|`, without end where there is no arm.
+/// `g/|h'|`, infinite if there is no arm.
 #[inline(always)]
 fn close_alike(gap_mm: &PerContact<f64>, weights: &Weights, teeth: &Teeth<'_>, closing: &mut [f64]) {
     let len = teeth.len;
@@ -322,8 +323,8 @@ impl UnlikeGaps {
         }
     }
 
-    /// Gaps and directions that the position decides. With `sin γ` from `F_S/F_H` and `cos β` from `F_K/F_H`, and `cos(β - δ)` of section 4.8 as
-    /// `(d cos β + r)/√(d² + 2dr cos β + r²)`.
+    /// Computes the gaps and directions that depend on the position. `sin γ` follows from `F_S/F_H`, `cos β` from
+    /// `F_K/F_H`, and `cos(β - δ)` of section 4.8 is `(d cos β + r)/√(d² + 2dr cos β + r²)`.
     #[inline(always)]
     fn prepare(&self, teeth: &Teeth<'_>, gaps: &mut GapWork<'_>) {
         let len = teeth.len;
@@ -360,7 +361,7 @@ impl UnlikeGaps {
             }
         }
         if self.deviating.is_some() {
-            // Of ψ + γ and of ψ/k + β.
+            // Rotates by ψ + γ and by ψ/k + β.
             let turn = |cos: &mut f64, sin: &mut f64, by_rad: f64| {
                 let (by_sin, by_cos) = by_rad.sin_cos();
                 (*cos, *sin) = (*cos * by_cos - *sin * by_sin, *sin * by_cos + *cos * by_sin);
@@ -372,7 +373,7 @@ impl UnlikeGaps {
         }
     }
 
-    /// `g/|h'|`, without end where there is no arm; false where a part may be too full.
+    /// `g/|h'|`, infinite if there is no arm. Returns false if interference is possible.
     #[inline(always)]
     fn close(&self, teeth: &Teeth<'_>, gaps: &GapWork<'_>, closing: &mut [f64]) -> bool {
         let count = teeth.rows * teeth.count;
@@ -388,7 +389,7 @@ impl UnlikeGaps {
         in_doubt == 0.0
     }
 
-    /// The same with what the items have.
+    /// The same with the deviations of the items.
     #[inline(always)]
     fn close_at_items(&self, teeth: &Teeth<'_>, gaps: &GapWork<'_>, closing: &mut [f64]) -> bool {
         let count = teeth.count;
@@ -416,7 +417,7 @@ impl UnlikeGaps {
         in_doubt == 0.0
     }
 
-    /// Whether a total gap is below zero, or so near to it that roundings decide.
+    /// Returns true if a total gap is below zero, or so near to it that rounding decides.
     #[inline(always)]
     fn is_in_doubt(&self, total_mm: f64) -> bool {
         total_mm < self.edge_mm && total_mm != 0.0

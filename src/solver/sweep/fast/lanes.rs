@@ -1,41 +1,41 @@
-//! Elementary functions and columns without a branch or a call, so that the compiler makes vectors of them.
+//! Elementary functions and columns without branches and calls, so that the compiler can vectorise them.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use pulp::Simd;
 
-/// States worked on in one stretch of straight code; a multiple of every vector's width.
+/// States processed in one chunk of straight-line code; a multiple of every vector's width.
 pub(super) const LANES: usize = 64;
 
-/// Doubles of the widest vector.
+/// Number of doubles in the widest vector.
 pub(crate) const VECTOR: usize = 8;
 
-/// Terms of the arctangent's series at most. A drive that needs more goes the plain way.
+/// Largest number of terms of the arctangent's series. A drive that needs more uses the plain path.
 const MAX_TERMS: usize = 24;
 
-/// What is added to the bits of a number so that its exponent steps at √½ and not at 1: the mantissa then lies in [√½, √2).
+/// Added to the bits of a number, it makes the exponent step at √½ instead of 1: the mantissa is then in [√½, √2).
 const FROM_ROOT_HALF: u64 = 0x3ff0_0000_0000_0000 - ROOT_HALF;
-/// The bits of √½.
+/// Bits of √½.
 const ROOT_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
 const MANTISSA: u64 = 0x000f_ffff_ffff_ffff;
-/// 2^52: in the bits of a sum with it whole numbers stand as they are.
+/// 2^52: added to a whole number, it puts that number into the low bits of the sum.
 const WHOLE: f64 = 4_503_599_627_370_496.0;
 
-/// ln 2 in two parts, of which the first has so many zeros at its end that its product with any exponent is exact.
+/// ln 2 in two parts. The first ends in so many zero bits that its product with any exponent is exact.
 const LN_2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
-/// The coefficients of `(artanh s)/s - 1` over `s²` and its powers, as many as reach the last digit for `|s| ≤ (√2 - 1)/(√2 + 1)`.
+/// Coefficients of `(artanh s)/s - 1` over the powers of `s²`, enough for the last digit for `|s| ≤ (√2 - 1)/(√2 + 1)`.
 const ARTANH: [f64; 9] =
     [1.0 / 3.0, 0.2, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0, 1.0 / 13.0, 1.0 / 15.0, 1.0 / 17.0, 1.0 / 19.0];
 
-/// `ab + c`, rounded once where vectors can do that.
+/// Returns `ab + c`, rounded once if the vectors support it.
 #[inline(always)]
 pub(crate) fn fused<V: Simd>(a: f64, b: f64, c: f64) -> f64 {
     if V::IS_SCALAR { a * b + c } else { a.mul_add(b, c) }
 }
 
-/// `ln x` of a normal positive number, to two units of the last digit.
+/// Returns `ln x` of a normal positive number, to two units in the last place.
 #[inline(always)]
 pub(crate) fn ln<V: Simd>(x: f64) -> f64 {
     let shifted = x.to_bits().wrapping_add(FROM_ROOT_HALF);
@@ -53,22 +53,24 @@ pub(crate) fn ln<V: Simd>(x: f64) -> f64 {
     fused::<V>(exponent, LN_2_HIGH, twice + fused::<V>(twice * z, sum, exponent * LN_2_LOW))
 }
 
-/// `ln x` of a normal positive number, to 0.03: a start for a search.
+/// Returns `ln x` of a normal positive number, to 0.03, as an initial value.
 #[inline(always)]
 pub(super) fn ln_roughly(x: f64) -> f64 {
-    /// Half of what `log2 m` exceeds `m - 1` by at most, 1 ≤ m ≤ 2.
+    /// Half of the largest excess of `log2 m` over `m - 1`, 1 ≤ m ≤ 2.
     const HALF_BULGE: f64 = 0.043;
-    // As a whole number the bits count exponent and mantissa on a scale that is straight from each power of two to the next.
+    // As an integer, the bits count exponent and mantissa on a scale that is linear between powers of two.
     let straight = f64::from_bits((x.to_bits() >> 12) | WHOLE.to_bits()) - WHOLE;
     (straight / (1_u64 << 40) as f64 - (1023.0 - HALF_BULGE)) * std::f64::consts::LN_2
 }
 
-/// `x^(-1/N)` of a normal positive number, to two units of the last digit, without a division: the bits of a double count exponent and mantissa on a scale that is
-/// straight from each power of two to the next, and a place on it goes to a guess y; then `1/(1 - ε)^(1/N)` by its series, `ε = 1 - x y^N`, as often as it takes.
+/// Returns `x^(-1/N)` of a normal positive number, to two units in the last place, without a division. The bits of a
+/// double are a scale that is linear between powers of two and give an initial value y. It is refined by the series of
+/// `1/(1 - ε)^(1/N)`, `ε = 1 - x y^N`.
 #[inline(always)]
 fn inverse_root<V: Simd, const N: u32>(x: f64) -> f64 {
     const PER_EXPONENT: f64 = (1_u64 << 40) as f64;
-    // What makes ε alike above and below: 10 % at first for N = 3, then 5e-5 and 7e-16; 29 % for N = 10, then 3e-3, 2e-11 and 2e-15.
+    // Balances ε above and below: at first 10 % for N = 3, then 5e-5 and 7e-16; 29 % for N = 10, then 3e-3, 2e-11 and
+    // 2e-15.
     let (balance, rounds) = if N == 3 { (0.068, 2) } else { (0.058, 3) };
     let share = 1.0 / f64::from(N);
     let (second, third) = (0.5 * share * (1.0 + share), share * (1.0 + share) * (2.0 + share) / 6.0);
@@ -90,14 +92,14 @@ fn inverse_root<V: Simd, const N: u32>(x: f64) -> f64 {
     inverse
 }
 
-/// `∛x` of a number that is not negative.
+/// Returns `∛x` of a non-negative number.
 #[inline(always)]
 pub(super) fn cube_root<V: Simd>(x: f64) -> f64 {
     let inverse = inverse_root::<V, 3>(x);
     x * (inverse * inverse)
 }
 
-/// `x^(1/9)` of a normal positive number.
+/// Returns `x^(1/9)` of a normal positive number.
 #[inline(always)]
 pub(super) fn ninth_root<V: Simd>(x: f64) -> f64 {
     let inverse = inverse_root::<V, 9>(x);
@@ -105,13 +107,13 @@ pub(super) fn ninth_root<V: Simd>(x: f64) -> f64 {
     x * ((square * square) * (square * square))
 }
 
-/// `x^(-1/10)` of a normal positive number.
+/// Returns `x^(-1/10)` of a normal positive number.
 #[inline(always)]
 pub(super) fn inverse_tenth_root<V: Simd>(x: f64) -> f64 {
     inverse_root::<V, 10>(x)
 }
 
-/// The coefficients of Cephes' `atan`, `x + x³ P(x²)/Q(x²)` up to 0.66.
+/// Coefficients of Cephes' `atan`, `x + x³ P(x²)/Q(x²)` up to 0.66.
 const ARCTANGENT_OVER: [f64; 5] = [
     -8.750_608_600_031_904e-1,
     -1.615_753_718_733_365e1,
@@ -128,7 +130,7 @@ const ARCTANGENT_UNDER: [f64; 6] = [
     1.945_506_571_482_614e2,
 ];
 
-/// `atan2(y, x)`, not both of them 0, to two units of the last digit of its largest value.
+/// Returns `atan2(y, x)`, not both 0, to two units in the last place of its largest value.
 #[inline(always)]
 pub(crate) fn angle<V: Simd>(y: f64, x: f64) -> f64 {
     const TAN_PI_8: f64 = 0.414_213_562_373_095_03;
@@ -147,7 +149,7 @@ pub(crate) fn angle<V: Simd>(y: f64, x: f64) -> f64 {
     half.copysign(y)
 }
 
-/// How many terms of `atan q = q (1 - q²/3 + q⁴/5 - …)` reach the last digit for `0 ≤ q ≤ largest`.
+/// Returns the number of terms of `atan q = q (1 - q²/3 + q⁴/5 - …)` that reach the last digit for `0 ≤ q ≤ largest`.
 pub(super) fn arctangent_terms(largest: f64) -> Option<usize> {
     let square = largest * largest;
     let mut power = 1.0;
@@ -157,7 +159,7 @@ pub(super) fn arctangent_terms(largest: f64) -> Option<usize> {
     })
 }
 
-/// The coefficients of `atan q` over `q` and the powers of `q²`.
+/// Coefficients of `atan q` over `q` and the powers of `q²`.
 const ARCTANGENT: [f64; MAX_TERMS] = {
     let mut coefficients = [0.0; MAX_TERMS];
     let (mut term, mut sign) = (0, 1.0);
@@ -182,7 +184,8 @@ pub(super) fn arctangents(ratios: &mut [f64; LANES], terms: usize) {
     }
 }
 
-/// The largest of values that are not negative: first of each lane, since one running value could not be vectorised.
+/// Returns the largest of non-negative values. It computes one maximum for each lane, since a single one cannot be
+/// vectorised.
 #[inline(always)]
 pub(super) fn largest(values: &[f64]) -> f64 {
     let (stretches, rest) = values.as_chunks::<{ 2 * VECTOR }>();
@@ -201,8 +204,8 @@ pub(super) fn largest(values: &[f64]) -> f64 {
     largest
 }
 
-/// Each value so many times in a row, the last one up to the end of its stretch too. Whole vectors are written, and what is too much is overwritten by
-/// the next; the last needs room.
+/// Repeats each value in a row, the last one up to the end of its chunk. Whole vectors are written, and the next value
+/// overwrites the excess; the last needs extra space.
 #[inline(always)]
 pub(super) fn repeat_each(values: &[f64], times: usize, repeated: &mut [f64]) {
     for (row, &value) in values.iter().enumerate() {
@@ -239,7 +242,7 @@ mod tests {
         for step in -100_000..100_000 {
             let x = 1.0 + f64::from(step) * 9e-6;
             assert!(close(ln::<V>(x), x.ln()), "ln {x}");
-            // Roots of powers of ten, to 10 units of the last digit: by powers, since no library has them all.
+            // Powers of ten have no library root: x is raised to powers instead. Tolerance: 10 units in the last place.
             let (cube, ninth, tenth) = (x.powi(3), x.powi(9), x.powi(10));
             for root in [cube_root::<V>(cube), ninth_root::<V>(ninth), 1.0 / inverse_tenth_root::<V>(tenth)] {
                 assert!((root - x).abs() <= 10.0 * f64::EPSILON * x, "{root} is not {x}");
@@ -254,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithms_and_roots_are_right_to_a_few_units_of_the_last_digit_on_any_machine() {
+    fn logarithms_and_roots_are_accurate_to_last_digits() {
         assert_to_a_few_units::<pulp::Scalar>();
         #[cfg(target_arch = "x86_64")]
         assert_to_a_few_units::<pulp::x86::V3>();

@@ -1,19 +1,21 @@
-//! Which samples of a sweep stand where in which lap of its mesh, and which teeth stand there (docs/theory.md sections 3 and 9).
+//! Assignment of a sweep's samples to laps of its mesh, and the teeth at each sample (docs/explanation/theory.md
+//! sections 3 and 9).
 
 use crate::mesh::{Mesh, Neighbours, Place, Samples};
 
-/// A count that memory can hold, as an index; the caller has bounded the sweep.
+/// Converts a count to an index. The caller has bounded the sweep to what fits in memory.
 pub(super) fn whole(count: u64) -> usize {
     usize::try_from(count).unwrap_or(usize::MAX)
 }
 
-/// How the teeth at an input angle lie in a tile: all those at the places one after another, so many times. Of each time those first whose places are
-/// whole multiples of `apart` from the first: neighbours in a zone.
+/// Order of the teeth at an input angle in a tile: all places in sequence, repeated for each distinguished tooth.
+/// Within each sequence, teeth whose places are a multiple of `apart` from the first are adjacent: neighbours in a
+/// zone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
-    /// Teeth that are told apart at each place.
+    /// Number of teeth that are distinguished at each place.
     pub(super) at_each_place: usize,
-    /// How far the places of neighbours in a zone are apart.
+    /// Distance of the places of neighbours in a zone.
     pub(super) apart: usize,
 }
 
@@ -21,7 +23,7 @@ impl Layout {
     /// One tooth at each place, place by place.
     pub(super) const PLAIN: Self = Self { at_each_place: 1, apart: 1 };
 
-    /// Where the tooth at a place, counted from 1, stands among `places`, the first of those told apart.
+    /// Returns the index of a place, counted from 1, among `places`, for the first of the distinguished teeth.
     pub(super) fn index(self, place: usize, places: usize) -> usize {
         let (before, residue) = ((place - 1) / self.apart, (place - 1) % self.apart);
         let of_residues_before = residue * (places / self.apart) + residue.min(places % self.apart);
@@ -29,12 +31,12 @@ impl Layout {
     }
 }
 
-/// Teeth of a zone that stand side by side in a tile as they do in the answer.
+/// Teeth of a zone that are adjacent both in a tile and in the answer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Listed {
-    /// The first of them in a row of the tile.
+    /// Index of the first of them in a row of the tile.
     pub(super) at: usize,
-    /// Who they are.
+    /// The teeth.
     pub(super) teeth: Neighbours,
 }
 
@@ -43,23 +45,23 @@ impl Listed {
         whole(self.teeth.count)
     }
 
-    /// Where one of them is among the items.
+    /// Returns the place of one of them among the items.
     pub(super) fn place(&self, mesh: &Mesh, tooth: usize) -> Place {
         mesh.place_of(&self.teeth, tooth as u64)
     }
 }
 
-/// The teeth of a lap.
+/// Teeth of a lap.
 #[derive(Debug, Default)]
 pub(super) struct LapTeeth {
     runs: Vec<Neighbours>,
-    /// In the order of the answer.
+    /// Listed teeth in the order of the answer.
     pub(super) listed: Vec<Listed>,
-    /// The same, lobe or not.
+    /// The same teeth in chunks, independent of the lobe.
     pub(super) stretches: Vec<Stretch>,
 }
 
-/// Teeth of a row that stand side by side in the tile as they do in the answer.
+/// Teeth of a row that are adjacent both in the tile and in the answer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
     pub(super) at: usize,
@@ -72,7 +74,7 @@ impl LapTeeth {
         let apart = mesh.laps_of_load_period();
         self.listed.clear();
         self.listed.extend(self.runs.iter().map(|&teeth| {
-            // Lobes that are as many apart as these stand alike.
+            // Lobes that differ by a multiple of this number carry alike.
             let which = if layout.at_each_place > 1 { whole(teeth.lobe / apart) } else { 0 };
             Listed { at: which * places + layout.index(whole(teeth.first_place), places), teeth }
         }));
@@ -86,17 +88,18 @@ impl LapTeeth {
     }
 }
 
-/// The laps of a sweep over equal intervals. Sample n, of N in a load period of L laps, stands where `n L = l N + f` with f below N: in lap l, f of its N parts on. With
-/// `G = gcd(N, L)`, `S = N/G` and `q = L/G` that is `n q = l S + f/G`.
+/// Laps of a sweep over equal intervals. For sample n of N in a load period of L laps, `n L = l N + f` with f below N.
+/// It is in lap l at f/N of the lap. With `G = gcd(N, L)`, `S = N/G` and `q = L/G` this is `n q = l S + f/G`.
 pub(super) struct Laps {
     mesh: Mesh,
     samples: Samples,
     /// `S`.
     pub(super) of_lap: Samples,
-    /// `q`: samples of a lap are as many of its S parts apart.
+    /// `q`: distance between successive samples of a lap, in S parts of it.
     pub(super) stride: u64,
     count: u64,
-    /// Where the teeth of all zones are listed, how many of them before each of S samples one after another, which stand at all of a lap's S parts, and of them all.
+    /// Number of listed teeth before each of S successive samples, which cover all parts of a lap, and in total. Set if
+    /// the teeth of all zones are listed.
     before: Option<Vec<usize>>,
 }
 
@@ -121,17 +124,18 @@ impl Laps {
         Self { mesh: *mesh, samples, of_lap, stride, count: mesh.laps(), before }
     }
 
-    /// The mesh of the sweep.
+    /// Returns the mesh of the sweep.
     pub(super) const fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// Whether the teeth of all zones are listed.
+    /// Returns true if the teeth of all zones are listed.
     pub(super) const fn are_listed(&self) -> bool {
         self.before.is_some()
     }
 
-    /// The laps of which a sample stands at this part; where teeth are listed also that which begins where the sweep ends.
+    /// Returns the laps with a sample at this part. If teeth are listed, this includes the lap that begins at the
+    /// sweep's end.
     pub(super) fn with(&self, fraction: u64) -> impl Iterator<Item = u64> + use<> {
         let Self { stride, count, .. } = *self;
         let of_lap = self.of_lap.count();
@@ -140,12 +144,12 @@ impl Laps {
         (first..count).step_by(whole(stride)).chain(end)
     }
 
-    /// Whether a lap begins where the sweep ends.
+    /// Returns true if a lap begins at the end of the sweep.
     pub(super) const fn is_end(&self, lap: u64) -> bool {
         lap == self.count
     }
 
-    /// The sample at a part of a lap.
+    /// Returns the sample at a part of a lap.
     pub(super) const fn sample(&self, lap: u64, fraction: u64) -> u64 {
         (lap * self.of_lap.count() + fraction) / self.stride
     }
@@ -154,19 +158,19 @@ impl Laps {
         self.mesh.input_angle_deg(sample, self.samples)
     }
 
-    /// States that are listed before a sample.
+    /// Returns the number of listed states before a sample.
     pub(super) fn states_before(&self, sample: u64) -> usize {
         let Some(before) = &self.before else { return 0 };
         let of_lap = self.of_lap.count();
         whole(sample / of_lap) * before[whole(of_lap)] + before[whole(sample % of_lap)]
     }
 
-    /// Samples of the sweep, with its end.
+    /// Returns the number of samples of the sweep, including its end.
     pub(super) fn sample_count(&self) -> usize {
         whole(self.mesh.last_sample(self.samples) + 1)
     }
 
-    /// States of the sweep, with those at its end.
+    /// Returns the number of states of the sweep, including those at its end.
     pub(super) fn state_count(&self) -> usize {
         whole(self.mesh.state_count(self.samples))
     }

@@ -1,4 +1,4 @@
-//! Moments anywhere in a lap, in columns: what the search for extremes looks at.
+//! Evaluation of arbitrary moments of a lap in columns, for the search for extremes.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -16,35 +16,36 @@ use crate::sweep::columns::{AngleExtremes, TorqueBalance, TorqueCapacity};
 use crate::sweep::search::{LOADS, Look, Piece, Seen};
 use crate::{SolveError, Stop};
 
-/// Moments by the kernel.
+/// Evaluates moments with the kernel.
 pub(super) struct FastLook<'a> {
     kernel: &'a Kernel,
     loaded: &'a LoadedDrive<'a>,
     stop: &'a dyn Stop,
-    /// That of the sweep.
+    /// Mesh of the sweep.
     mesh: Mesh,
     layout: Layout,
     lap_teeth: LapTeeth,
     rows: usize,
     tile: Tile<'a>,
     balance: TorqueBalance,
-    /// Where the teeth of each piece of a lap stand that was looked at.
+    /// Base positions of the teeth, for each piece of a lap that was evaluated.
     bases: Vec<Bases>,
     pub(super) torque_balance_residual: f64,
     pub(super) capacity: Option<TorqueCapacity>,
     pub(super) angles: AngleExtremes,
 }
 
-/// Where the teeth of a piece stand: those near a lobe at its end, all others at its start, so that nothing cancels near an axis.
+/// Base positions of the teeth of a piece: at its end for those near a lobe, at its start for all others, so that
+/// nothing cancels near an axis.
 struct Bases {
     piece: Piece,
     is_near_lobe: Vec<bool>,
     last_place: usize,
     sin: Vec<f64>,
     cos: Vec<f64>,
-    /// ψ, over the distance from one place to the next, where no part of a lap has passed.
+    /// ψ at the start of the lap, in units of the distance between places.
     place: Vec<f64>,
-    /// The distance of a place from the next, and how far the phase moves in a lap.
+    /// Distance between places, and change of the phase in a lap.
     spacing_rad: f64,
     phase_rad: f64,
 }
@@ -70,7 +71,7 @@ impl Bases {
         Self { piece, is_near_lobe, last_place, sin, cos, place: place_of, spacing_rad, phase_rad }
     }
 
-    /// Positions of all teeth at some moments, by moment and then tooth.
+    /// Computes the positions of all teeth at some moments, by moment and then tooth.
     #[inline(always)]
     fn place(&self, fractions: &[f64], tile: &mut Tile<'_>) {
         let teeth = self.sin.len();
@@ -83,7 +84,7 @@ impl Bases {
             let (sin, cos) = (&mut tile.sin[at.clone()], &mut tile.cos[at.clone()]);
             for i in 0..teeth {
                 let (turn_sin, turn_cos) = if self.is_near_lobe[i] { (back_sin, back_cos) } else { (-on_sin, on_cos) };
-                // What rounding puts beyond an axis stands on it.
+                // Rounding beyond an axis is set to the axis.
                 sin[i] = (self.sin[i] * turn_cos + self.cos[i] * turn_sin).max(0.0);
                 cos[i] = (self.cos[i] * turn_cos - self.sin[i] * turn_sin).max(0.0);
             }
@@ -100,7 +101,8 @@ impl Bases {
 }
 
 impl<'a> FastLook<'a> {
-    /// In an arena of the size's doubles. The drive is loaded over one zone, as which the mesh is looked at.
+    /// Builds the evaluation in an arena of the size's doubles. The drive is loaded over one zone, in which the mesh is
+    /// evaluated.
     pub(super) fn new(
         kernel: &'a Kernel,
         loaded: &'a LoadedDrive<'a>,
@@ -126,7 +128,7 @@ impl<'a> FastLook<'a> {
         }
     }
 
-    /// Works out the loads of a tile of moments; false where the plain path is needed.
+    /// Computes the loads of a tile of moments. Returns false if the plain path is needed.
     #[inline(always)]
     fn work_out<V: Simd>(&mut self, bases: usize, fractions: &[f64], seen: &mut Seen) -> bool {
         let (kernel, loaded, tile) = (self.kernel, self.loaded, &mut self.tile);
@@ -204,7 +206,7 @@ impl Look for FastLook<'_> {
     }
 
     fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
-        // Teeth stand alike in every lap.
+        // Positions repeat in every lap.
         let piece = Piece { lap: 0, ..seen.piece };
         let bases = self.bases.iter().position(|bases| bases.piece == piece).unwrap_or_else(|| {
             self.bases.push(Bases::new(&self.mesh, self.layout, piece));
@@ -225,7 +227,7 @@ impl Look for FastLook<'_> {
     }
 }
 
-/// A look as `pulp` wants it, as [`super::Vectorised`].
+/// Evaluation in the form that `pulp` needs, as [`super::Vectorised`].
 struct Looking<'l, 'a> {
     look: &'l mut FastLook<'a>,
     bases: usize,

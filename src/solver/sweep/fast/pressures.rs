@@ -1,4 +1,5 @@
-//! Contacts that are no lines, in columns: the ellipses of balls and the flats of flat-sided teeth (docs/theory.md sections 4.3 and 5).
+//! Contacts other than line contacts, in columns: the ellipses of balls and the flats of flat-sided teeth
+//! (docs/explanation/theory.md sections 4.3 and 5).
 
 use pulp::Simd;
 
@@ -11,21 +12,21 @@ use crate::load_sharing::LoadedDrive;
 use crate::position::Position;
 use crate::tooth::{BallContact, Flat, StressExponents};
 
-/// Intervals of the flank between the places that tell the range of what curves go over.
+/// Number of intervals of the flank used to find the range of the curves' arguments.
 const INTERVALS: u32 = 32;
 
-/// What presses where.
+/// Pressure model of the three contacts.
 pub(super) enum Pressures {
-    /// Lines at all three contacts, worked out with the geometry.
+    /// Lines at all three contacts, computed with the geometry.
     Lines,
-    /// Ellipses at all three.
+    /// Ellipses at all three contacts.
     Ellipses(Ellipses),
     /// Lines at wave generator and ring, a flat at the carrier.
     Flat(FlatColumns),
 }
 
 impl Pressures {
-    /// Nothing where their curves would take too many terms.
+    /// Builds the model; none if its curves need too many terms.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
         if let Some(ball) = loaded.ball(Contact::WaveGenerator) {
             Ellipses::new(loaded, &ball).map(Self::Ellipses)
@@ -36,7 +37,7 @@ impl Pressures {
         }
     }
 
-    /// `E*/(π L1)` of each contact; of balls, of which curvatures are wanted first, 1.
+    /// Returns `E*/(π L1)` of each contact; 1 for balls, whose curvatures are needed first.
     pub(super) fn hertz(&self, loaded: &LoadedDrive<'_>) -> PerContact<f64> {
         PerContact::of(|contact| match self {
             Self::Lines | Self::Flat(_) => loaded.hertz(contact).modulus_per_width_mpa_per_mm(),
@@ -44,7 +45,7 @@ impl Pressures {
         })
     }
 
-    /// The powers of the stresses that forces go with.
+    /// Returns the powers of the stresses to which forces are proportional.
     pub(super) const fn stress_exponents(&self) -> StressExponents {
         match self {
             Self::Lines => StressExponents::Lines,
@@ -53,7 +54,8 @@ impl Pressures {
         }
     }
 
-    /// Finishes a tile: stresses under 1 N at the wave generator, and what its places decide of the law; false where it takes the plain path.
+    /// Completes a tile: stresses under 1 N at the wave generator, and the place-dependent part of the law. Returns
+    /// false if it needs the plain path.
     #[inline(always)]
     pub(super) fn finish<V: Simd>(&self, tile: &mut Tile<'_>) -> bool {
         match self {
@@ -64,7 +66,7 @@ impl Pressures {
     }
 }
 
-/// Centres and curvatures along the flank that teeth engage.
+/// Returns centres and curvatures along the engaged flank.
 fn along_flank(loaded: &LoadedDrive<'_>) -> Option<Vec<(ToothCenter, PerContact<f64>)>> {
     let limit = loaded.mesh().flank_limit().position;
     let lobes = loaded.drive().lobes();
@@ -78,8 +80,8 @@ fn along_flank(loaded: &LoadedDrive<'_>) -> Option<Vec<(ToothCenter, PerContact<
     (0..=INTERVALS).map(|place| loaded.center_and_curvatures(position(place)).ok()).collect()
 }
 
-/// What an ellipse's approach and pressure are under 1 N, over the logarithm of the curvature in the plane of motion: `q`, and the pressure over that curvature's
-/// root, with which it rises where the curvature is large.
+/// Approach `q` and pressure of an ellipse under 1 N, over the logarithm of the curvature in the plane of motion. The
+/// pressure is divided by that curvature's root, to which it is proportional for large curvatures.
 struct EllipseCurves(Curves<2>);
 
 impl EllipseCurves {
@@ -92,7 +94,7 @@ impl EllipseCurves {
         Curves::around(curvatures_per_mm.map(f64::ln), of_ln).map(Self)
     }
 
-    /// `q` and the pressure under 1 N; nothing where a curvature is beyond the range.
+    /// Returns `q` and the pressure under 1 N; none if a curvature is beyond the range.
     #[inline(always)]
     fn at<V: Simd>(&self, curvature_per_mm: &[f64; LANES], count: usize) -> Option<[[f64; LANES]; 2]> {
         let mut logarithms = [0.0; LANES];
@@ -111,7 +113,7 @@ impl EllipseCurves {
 pub(super) struct Ellipses {
     wave_generator: EllipseCurves,
     ring: EllipseCurves,
-    /// `q` and the pressure under 1 N on the flat wall of a slot, alike everywhere.
+    /// `q` and the pressure under 1 N on the flat wall of a slot, the same everywhere.
     carrier: [f64; 2],
 }
 
@@ -127,7 +129,7 @@ impl Ellipses {
         })
     }
 
-    /// Curvatures stand where stresses go. `c = Σ q f^(5/3)` by virtual work.
+    /// The stress columns contain curvatures. `c = Σ q f^(5/3)` by virtual work.
     #[inline(always)]
     fn finish<V: Simd>(&self, tile: &mut Tile<'_>) -> bool {
         let [carrier_coefficient, carrier_stress] = self.carrier;
@@ -160,7 +162,7 @@ impl Ellipses {
 /// The flats of flat-sided teeth.
 pub(super) struct FlatColumns {
     flat: Flat,
-    /// Over the length that is borne, where the flat gives way by its own law.
+    /// Compliance over the supported length, if the flat has its own law.
     compliance: Option<Curves<1>>,
 }
 
@@ -188,7 +190,7 @@ impl FlatColumns {
             for i in 0..LANES {
                 borne_mm[i] = self.flat.borne_mm(center_radius_mm[i]);
             }
-            // The plain path says which tooth has left its slot.
+            // The plain path reports which tooth has left its slot.
             if !borne_mm[..count].iter().all(|&borne_mm| borne_mm > 0.0) {
                 return false;
             }

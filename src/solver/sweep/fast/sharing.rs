@@ -1,8 +1,9 @@
-//! How the teeth at an input angle share the load, for a tile of input angles together (docs/theory.md section 9, *Fast path*).
+//! Load sharing among the teeth at an input angle, for a tile of input angles together (docs/explanation/theory.md
+//! section 9, *Fast path*).
 //!
-//! The springs are those of [`crate::springs`], in columns. With gaps every search comes down to the rotation from above: each force is convex
-//! in the rotation, so that the tangents of all of them, wherever they touch, together never make more torque than the springs, and their root
-//! stands at or beyond the true one. A tooth that is open there is open at the true rotation too.
+//! The springs are those of [`crate::springs`], in columns. With gaps every search approaches the rotation from above.
+//! Each force is convex in the rotation, so the sum of all tangents never exceeds the springs' torque. Its root is at
+//! or beyond the true one. A tooth that is open there is open at the true rotation too.
 
 use pulp::Simd;
 
@@ -14,29 +15,29 @@ use crate::tooth::line::{JohnsonLine, WIDEST_SHARE};
 use crate::tooth::point::EllipticContact;
 use crate::tooth::{PALMGREN_EXPONENT, ToothLaw};
 
-/// Rounds of a search at most; a tile that needs more goes the plain way.
+/// Largest number of rounds of a search. A tile that needs more uses the plain path.
 const MAX_ROUNDS: u32 = 60;
 
-/// A relative step this small of a force under Johnson's law is the last: the next one would be of its square, less than the last digit.
+/// A relative step this small of a force under Johnson's law is the last: the next would be proportional to its square.
 const LAST_FORCE_STEP: f64 = 3e-8;
 
-/// The same of the rotation under a power law, and the part of the torque that rounding leaves open.
+/// The same for the rotation under a power law, and the relative error of the torque due to rounding.
 const LAST_ROTATION_STEP: f64 = 1e-9;
 const OPEN_TORQUE: f64 = 8.0 * f64::EPSILON;
 
-/// In place of nothing, where a logarithm is asked for: no contact knows a ratio or a force like this.
+/// Replaces zero where a logarithm is needed. No contact has a ratio or a force this small.
 const NOTHING: f64 = 1e-150;
 
-/// The force under which a flat would be too wide for Johnson's law, of which it knows nothing.
+/// Substitute for the force limit of a flat, to which the limit of Johnson's law does not apply.
 const NEVER_TOO_WIDE_N: f64 = 1e100;
 
-/// The teeth of a tile under 1 N at the wave generator, by input angle and then tooth.
+/// Teeth of a tile under 1 N at the wave generator, by input angle and then tooth.
 pub(super) struct Teeth<'a> {
-    /// Teeth at an input angle.
+    /// Number of teeth at an input angle.
     pub(super) count: usize,
-    /// Input angles.
+    /// Number of input angles.
     pub(super) rows: usize,
-    /// States, with those that fill the last stretch.
+    /// Number of states, including those that fill the last chunk.
     pub(super) len: usize,
     /// `d`.
     pub(super) center_radius_mm: &'a [f64],
@@ -52,21 +53,21 @@ pub(super) struct Teeth<'a> {
     pub(super) ring_stress: &'a [f64],
     /// Stress at the carrier.
     pub(super) carrier_stress: &'a [f64],
-    /// The powers of the stresses that forces go with.
+    /// Powers of the stresses to which forces are proportional.
     pub(super) stress_exponents: StressExponents,
 }
 
-/// The least torque of a tile under which a contact reaches a stress.
+/// Least torque of a tile under which a contact reaches a stress.
 pub(super) struct Limit {
-    /// Of one zone.
+    /// Torque of one zone.
     pub(super) torque_nmm: f64,
-    /// The contact that does.
+    /// The contact that reaches it.
     pub(super) contact: Contact,
-    /// The input angle of the tile.
+    /// Input angle in the tile.
     pub(super) row: usize,
 }
 
-/// What comes of it.
+/// Result of load sharing.
 pub(super) struct Shared<'a> {
     /// `F_H`, by state.
     pub(super) force: &'a mut [f64],
@@ -76,31 +77,32 @@ pub(super) struct Shared<'a> {
     pub(super) stiffness: &'a mut [f64],
 }
 
-/// Columns to work in.
+/// Working columns.
 pub(super) struct Work<'a> {
-    /// What the place of each tooth decides of its law: c of balls, the compliance of a flat.
+    /// Place-dependent part of each tooth's law: c of balls, the compliance of a flat.
     pub(super) given: &'a mut [f64],
-    /// Of a power law the force at the rotation 1; of Johnson's `A`, of a power beside a linear part this part.
+    /// Power law: force at the rotation 1. Johnson's law: `A`. Power with a linear part: that part.
     unit: &'a mut [f64],
-    /// `B` of Johnson's law, the power's coefficient.
+    /// Johnson's law: `B`. Otherwise the coefficient of the power.
     growth: &'a mut [f64],
     /// Rotation at which the gaps of a tooth are closed.
     pub(super) closing: &'a mut [f64],
-    /// Rotation beyond that; nothing or less where a gap is open.
+    /// Rotation beyond that; zero or negative if a gap is open.
     pressed: &'a mut [f64],
     /// `dF_H/dΔφ` of the tangent.
     slope: &'a mut [f64],
-    /// What the tangent makes of the force of a tooth that is not pressed.
+    /// Ordinate of the tangent, for a tooth that is not pressed.
     offset: &'a mut [f64],
     /// `F_H` over the approach along `F_H`.
     secant: &'a mut [f64],
-    /// Logarithm of the force at which Johnson's law has no meaning any more.
+    /// Logarithm of the force at which Johnson's law ends.
     reach: &'a mut [f64],
-    /// The same over the force.
+    /// The same relative to the force.
     margin: &'a mut [f64],
     /// Rotation beyond `last`, by state.
     excess: &'a mut [f64],
-    /// Closing angle that `excess` counts from, by state: that of the last tooth that carries, so that light loads keep their digits.
+    /// Reference closing angle of `excess`, by state: that of the last tooth that carries, so that light loads keep
+    /// their digits.
     last: &'a mut [f64],
     /// `F_H` under a limit.
     limit: &'a mut [f64],
@@ -108,17 +110,17 @@ pub(super) struct Work<'a> {
     row_last: &'a mut [f64],
     /// Torque of one zone under which a contact reaches its limit, by input angle.
     row_limit: &'a mut [f64],
-    /// What the forces under Johnson's law are counted in.
+    /// Unit of the forces under Johnson's law.
     typical_n: f64,
 }
 
 impl<'a> Work<'a> {
-    /// Columns of states.
+    /// Number of columns of states.
     pub(super) const COLUMNS: usize = 13;
-    /// Columns of input angles.
+    /// Number of columns of input angles.
     pub(super) const ROWS: usize = 3;
 
-    /// From slices of any length.
+    /// Builds the columns from slices of any length.
     pub(super) fn new(slice: &mut impl FnMut(usize) -> &'a mut [f64], column: usize, rows: usize) -> Self {
         Self {
             given: slice(column),
@@ -141,24 +143,25 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// How far beyond the closing of each tooth an input angle is turned, once its load is shared beyond gaps: less than nothing where a gap is open.
+    /// Returns the rotation of each tooth at an input angle beyond its closing angle, after load sharing with gaps. It
+    /// is negative if a gap is open.
     pub(super) fn pressed_rad(&self, row: usize, count: usize) -> impl Iterator<Item = f64> {
         let (last, excess) = (self.row_last[row], self.row_excess[row]);
         self.closing[row * count..(row + 1) * count].iter().map(move |closing| excess + (last - closing))
     }
 
-    /// What the last search for a limit found, by input angle: the torque of one zone.
+    /// Returns the result of the last search for a limit, by input angle: the torque of one zone.
     pub(super) const fn limits_nmm(&self) -> &[f64] {
         self.row_limit
     }
 }
 
-/// What an approach at each contact adds along `F_H` ([`Compatibility`]): 1 at the wave generator, `along_ring (F_K/F_H)^±1` at the ring,
-/// `carrier F_S/F_H` at the carrier.
+/// Contribution of each contact's approach along `F_H` ([`Compatibility`]): 1 at the wave generator,
+/// `along_ring (F_K/F_H)^±1` at the ring, `carrier F_S/F_H` at the carrier.
 #[derive(Clone, Copy)]
 pub(super) struct Weights {
     pub(super) ring_exponent: f64,
-    /// `along_ring = 1 - this (F_S/F_H)²`.
+    /// Factor in `along_ring = 1 - this (F_S/F_H)²`.
     pub(super) ring_decline: f64,
     pub(super) carrier: f64,
 }
@@ -178,7 +181,7 @@ impl Weights {
     }
 }
 
-/// The closing angle of the last tooth that carries at a rotation that is given from another.
+/// Returns the closing angle of the last tooth that carries at a rotation, which is given relative to another.
 #[inline(always)]
 fn last_below(closing: &[f64], from_last: f64, excess: f64) -> f64 {
     closing.iter().fold(
@@ -189,14 +192,14 @@ fn last_below(closing: &[f64], from_last: f64, excess: f64) -> f64 {
     )
 }
 
-/// The last of closing angles that are finite.
+/// Returns the last of the finite closing angles.
 #[inline(always)]
 fn last_of(closing: &[f64]) -> f64 {
     last_below(closing, 0.0, f64::INFINITY)
 }
 
-/// Where all springs together would stand if each kept the weight that it has here: a rotation to start from, above the true one where the weights are
-/// those of tangents. In two parts, of which the first is a closing angle.
+/// Returns the rotation of all springs if each kept its present weight: an initial value, above the true one if the
+/// weights are those of tangents. It has two parts, the first of which is a closing angle.
 #[inline(always)]
 fn start_above(excess_alone: f64, weight: impl Fn(usize) -> f64, closing: &[f64]) -> Option<(f64, f64)> {
     let last = last_of(closing);
@@ -212,7 +215,7 @@ fn start_above(excess_alone: f64, weight: impl Fn(usize) -> f64, closing: &[f64]
     carrying.is_finite().then_some((carrying, excess + (last - carrying)))
 }
 
-/// How far each tooth is pressed at the rotation of its row.
+/// Computes the rotation of each tooth beyond closure at the rotation of its row.
 #[inline(always)]
 fn press<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>) {
     let rows = teeth.rows;
@@ -230,7 +233,8 @@ fn press<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>) {
     }
 }
 
-/// The force at which the first contact of each tooth reaches its allowable stress: for lines of contact `(σ_a/σ)²` of the stress under 1 N.
+/// Computes the force at which the first contact of each tooth reaches its allowable stress: `(σ_a/σ)²` for line
+/// contacts.
 #[inline(always)]
 fn forces_at_stress(per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, force: &mut [f64]) {
     let len = teeth.len;
@@ -251,7 +255,8 @@ fn forces_at_stress(per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, force: &
     }
 }
 
-/// Turns each row to where the first of its teeth is pressed as far as its limit, which stands in `work.pressed`; false where a row has none.
+/// Rotates each row until its first tooth reaches its limit, which is in `work.pressed`. Returns false if a row has no
+/// limit.
 #[inline(always)]
 fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) -> bool {
     for row in 0..teeth.rows {
@@ -274,7 +279,7 @@ fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) -> bool {
     true
 }
 
-/// The least torque of the rows, each turned to its limit, under these forces.
+/// Returns the least torque of the rows, each at its limit, under these forces.
 #[inline(always)]
 fn least_torque(
     per_allowable: &PerContact<f64>,
@@ -282,7 +287,7 @@ fn least_torque(
     work: &mut Work<'_>,
     force: &[f64],
 ) -> Option<Limit> {
-    // Of the force at the allowable stress, 1 N.
+    // Share of 1 N in the force at the allowable stress.
     let shares = |i: usize| {
         let exponents = teeth.stress_exponents;
         PerContact {
@@ -319,15 +324,15 @@ fn least_torque(
     least.filter(|least| least.torque_nmm.is_finite())
 }
 
-/// `ξ = c F^p`.
+/// Power law `ξ = c F^p`.
 pub(super) struct PowerLaw<P> {
     power: P,
     has_gaps: bool,
 }
 
-/// What a power law does to a column.
+/// Operations of a power law on a column.
 pub(super) trait Power {
-    /// Whether p is 1.
+    /// True if p is 1.
     const IS_LINEAR: bool;
 
     /// `p`.
@@ -342,11 +347,12 @@ pub(super) trait Power {
     /// `x^(1/p - 1)`.
     fn inverse_over_x<V: Simd>(&self, x: f64) -> f64;
 
-    /// The force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`, of which something may stand in a column.
+    /// Computes the force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`, part of which may be
+    /// given.
     fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]);
 }
 
-/// A linear law with gaps, or of teeth that have flats: their compliance is given.
+/// A linear law with gaps, or for flat-sided teeth, whose compliance is given.
 pub(super) struct Linear {
     compliance_mm_per_n: PerContact<f64>,
     weights: Weights,
@@ -398,7 +404,7 @@ pub(super) struct Palmgren {
     weights: Weights,
 }
 
-/// The same number, or next to nothing where it is nothing or less: roots are of positive ones.
+/// Returns the number, or a tiny positive one if it is not positive: roots need positive arguments.
 #[inline(always)]
 fn positive(x: f64) -> f64 {
     if x > NOTHING { x } else { NOTHING }
@@ -427,7 +433,7 @@ impl Power for Palmgren {
         ninth_root::<V>(positive(x))
     }
 
-    /// With `F_K/F_H` to the power 1.9 by virtual work and -0.1 by projection, and `F_S/F_H` to the power 1.9.
+    /// Uses `F_K/F_H` to the power 1.9 by virtual work and -0.1 by projection, and `F_S/F_H` to the power 1.9.
     #[inline(always)]
     fn units<V: Simd>(&self, teeth: &Teeth<'_>, _: &[f64], unit: &mut [f64]) {
         let len = teeth.len;
@@ -445,7 +451,7 @@ impl Power for Palmgren {
     }
 }
 
-/// Hertz's law of balls: its coefficient changes with the place, and c is given.
+/// Hertz's law of balls. Its coefficient varies with the place, and c is given.
 pub(super) struct Hertz;
 
 impl Power for Hertz {
@@ -482,31 +488,32 @@ impl Power for Hertz {
     }
 }
 
-/// A law that neither the forces nor the rotation follow from without the other.
+/// A law without a closed form for both the forces and the rotation.
 pub(super) struct NoPowerLaw<L> {
     law: L,
     has_gaps: bool,
 }
 
-/// What such a law does to a column, from two coefficients of each tooth.
+/// Operations of such a law on a column, with two coefficients for each tooth.
 pub(super) trait TwoParts {
     /// `-F d²ξ/dF²` over `ξ/F - dξ/dF`.
     const BEND: f64;
 
-    /// The coefficients of each tooth, forces counted in `typical_n`, and the logarithm of the force at which the law has no meaning any more.
+    /// Computes the coefficients of each tooth, with forces in units of `typical_n`, and the logarithm of the force at
+    /// which the law ends.
     fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>);
 
-    /// `dξ/dF` where the law has a meaning, and `ξ/F - dξ/dF`.
+    /// Returns `dξ/dF` inside the law's range, and `ξ/F - dξ/dF`.
     fn slope_and_rest<V: Simd>(a: f64, b: f64, force: f64) -> [f64; 2];
 
-    /// About `ξ/F`.
+    /// Returns `ξ/F` approximately.
     fn over_force_roughly<V: Simd>(a: f64, b: f64, force: f64) -> f64;
 
-    /// `ln F`, if the law ends somewhere.
+    /// Returns `ln F` if the law ends at some force.
     fn ln_of<V: Simd>(force: f64) -> f64;
 }
 
-/// `ξ = c F^0.9 + e F`: Palmgren's law beside what gives way in proportion to the force.
+/// `ξ = c F^0.9 + e F`: Palmgren's law with a linear compliance.
 pub(super) struct PalmgrenAndLinear {
     coefficient: PerContact<f64>,
     compliance: PerContact<f64>,
@@ -555,18 +562,19 @@ impl TwoParts for PalmgrenAndLinear {
     }
 }
 
-/// `ξ = F (A - B ln F)`, Johnson's, with virtual work.
+/// `ξ = F (A - B ln F)`, Johnson's law, by virtual work.
 pub(super) struct Logarithm {
-    /// `A` of each contact, what stands behind it included.
+    /// `A` of each contact, including the series compliance.
     compliance: PerContact<f64>,
     /// `B` of each contact.
     growth: PerContact<f64>,
-    /// Force under which half a contact's width is the length that its law counts from: over the square of the stress under 1 N at wave generator and
-    /// ring, where the ratio of forces is to be counted in still; by itself at the carrier.
+    /// Force at which half a contact's width is the reference length of the law. At wave generator and ring it is
+    /// divided by the square of the stress under 1 N, without the ratio of forces. At the carrier it is the force
+    /// itself.
     reference: PerContact<f64>,
 }
 
-/// How unit loads become loads.
+/// Conversion of unit loads to loads.
 pub(super) enum Sharing {
     Linear(PowerLaw<Linear>),
     Palmgren(PowerLaw<Palmgren>),
@@ -576,7 +584,7 @@ pub(super) enum Sharing {
 }
 
 impl Sharing {
-    /// Of a drive under a load; nothing where its law is another one.
+    /// Returns the method of a drive under a load; none if its law has no columns.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
         let weights = Weights::new(loaded);
         let has_gaps = !loaded.gaps().is_nil();
@@ -616,7 +624,7 @@ impl Sharing {
         })
     }
 
-    /// What the places of a tile decide of the law, whatever the gaps.
+    /// Computes the place-dependent part of the law, independent of the gaps.
     #[inline(always)]
     pub(super) fn prepare<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
         match self {
@@ -628,7 +636,8 @@ impl Sharing {
         }
     }
 
-    /// Forces that make a torque together, that of one zone, beyond the gaps of which the closing angles stand in `work`; false where they are not found, or where the law ends.
+    /// Computes the forces that balance the torque of one zone, with the closing angles in `work`. Returns false if
+    /// they are not found or the law ends.
     #[inline(always)]
     pub(super) fn share<V: Simd>(
         &self,
@@ -648,7 +657,7 @@ impl Sharing {
 }
 
 impl Sharing {
-    /// Whether teeth begin and cease to carry between their entry and their exit.
+    /// Returns true if teeth begin and cease to carry between their entry and their exit.
     pub(super) const fn has_gaps(&self) -> bool {
         match self {
             Self::Linear(law) => law.has_gaps,
@@ -659,18 +668,18 @@ impl Sharing {
         }
     }
 
-    /// Whether forces are in proportion to what teeth are pressed by.
+    /// Returns true if forces are proportional to displacements.
     pub(super) const fn is_linear(&self) -> bool {
         matches!(self, Self::Linear(_))
     }
 
-    /// Whether all loads are in proportion, whatever the torque.
+    /// Returns true if all loads are proportional, whatever the torque.
     pub(super) const fn is_in_proportion(&self) -> bool {
         !matches!(self, Self::PalmgrenAndLinear(_) | Self::Logarithmic(_)) && !self.has_gaps()
     }
 
-    /// The least torque of the tile, of one zone, under which a contact reaches a stress, once the load is shared; nothing where it is not found, or
-    /// where the law ends before.
+    /// Returns the least torque of one zone in the tile under which a contact reaches a stress, after load sharing.
+    /// Returns none if it is not found or the law ends before.
     #[inline(always)]
     pub(super) fn limit<V: Simd>(
         &self,
@@ -727,7 +736,7 @@ impl<P: Power> PowerLaw<P> {
         }
     }
 
-    /// Without gaps the forces of all rotations are in proportion.
+    /// Shares the load without gaps: the forces of all rotations are proportional.
     #[inline(always)]
     fn share_in_proportion<V: Simd>(
         &self,
@@ -753,7 +762,7 @@ impl<P: Power> PowerLaw<P> {
         }
     }
 
-    /// Newton's method from above, by the tangents of all forces.
+    /// Newton's method from above, with the tangents of all forces.
     #[inline(always)]
     fn share_beyond_gaps<V: Simd>(
         &self,
@@ -824,7 +833,7 @@ impl<P: Power> PowerLaw<P> {
         false
     }
 
-    /// `F/(Δφ - θ)` of the teeth that are pressed, p times the slope.
+    /// Computes `F/(Δφ - θ)` of the loaded teeth, which is p times the slope.
     #[inline(always)]
     fn tangents<V: Simd>(&self, teeth: &Teeth<'_>, work: &mut Work<'_>) {
         let rows = teeth.rows;
@@ -843,7 +852,8 @@ impl<P: Power> PowerLaw<P> {
     }
 }
 
-/// Newton's method from "all carry": with a linear law its steps end where the set of teeth that carry stays the same.
+/// Newton's method that starts with all teeth carrying. With a linear law it ends when the set of carrying teeth is
+/// constant.
 #[inline(always)]
 fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
     for row in 0..teeth.rows {
@@ -861,7 +871,7 @@ fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, share
             if excess > 0.0 {
                 break (stiffness, excess);
             }
-            // Fewer each time: the last one is open.
+            // The number falls each time: the last tooth is open.
             last = last_below(closing, last, excess);
             if !last.is_finite() || excess.is_nan() {
                 return false;
@@ -878,8 +888,8 @@ fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, share
     true
 }
 
-/// Logarithm of the force under which half the width is the whole length over that at which Johnson's law ends, a little early, so that the plain way
-/// decides at the end itself.
+/// Returns the logarithm of the force at which half the width is the reference length, over that at which Johnson's law
+/// ends. It is slightly large, so that the plain path decides near the end.
 fn least_margin() -> f64 {
     1e-6 - 2.0 * WIDEST_SHARE.ln()
 }
@@ -915,7 +925,7 @@ impl TwoParts for Logarithm {
         }
     }
 
-    /// Where the law has a meaning its slope is more than a fifth of `B`.
+    /// In its range the law's slope is more than a fifth of `B`.
     #[inline(always)]
     fn slope_and_rest<V: Simd>(a: f64, b: f64, force: f64) -> [f64; 2] {
         let (beyond, least) = (a - b * ln::<V>(force) - b, 0.2 * b);
@@ -935,7 +945,7 @@ impl TwoParts for Logarithm {
 }
 
 impl<L: TwoParts> NoPowerLaw<L> {
-    /// The coefficients of each tooth, forces counted in one near to them all, so that no logarithm is large.
+    /// Computes the coefficients of each tooth, with forces in a typical unit, so that no logarithm is large.
     #[inline(always)]
     fn prepare<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
         work.typical_n = torque_nmm / teeth.arm[..teeth.count].iter().sum::<f64>();
@@ -951,7 +961,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
         }
     }
 
-    /// A force near the true one for each tooth, and the rotation that goes with them.
+    /// Computes an initial force for each tooth, and the matching rotation.
     #[inline(always)]
     fn start<V: Simd, const GAPS: bool>(
         torque: f64,
@@ -961,7 +971,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
     ) -> bool {
         let (count, len) = (teeth.count, teeth.len);
         let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
-        // As if all forces were the typical one.
+        // Assumes that all forces equal the typical one.
         let secant = &mut work.secant[..len];
         for i in 0..len {
             secant[i] = arm[i] / L::over_force_roughly::<V>(a[i], b[i], 1.0);
@@ -986,7 +996,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
         true
     }
 
-    /// The forces near those that the teeth are pressed by.
+    /// Estimates the forces from the displacements of the teeth.
     #[inline(always)]
     fn guess<V: Simd>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) {
         let len = teeth.len;
@@ -994,7 +1004,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
         let pressed = &work.pressed[..len];
         let (excess, force) = (&work.excess[..len], &mut force[..len]);
         for i in 0..len {
-            // Of a tooth that is open as if it were not: it may turn out to carry.
+            // An open tooth is treated as closed, because it may turn out to carry.
             let pressed = if pressed[i] > 0.0 { pressed[i] } else { excess[i] };
             let first = pressed * arm[i] / L::over_force_roughly::<V>(a[i], b[i], 1.0);
             let second = pressed * arm[i] / L::over_force_roughly::<V>(a[i], b[i], positive(first));
@@ -1002,7 +1012,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
         }
     }
 
-    /// Forces here are counted in that of the sharing before, and the limit too.
+    /// Forces, and the limit, are in the unit of the previous load sharing.
     #[inline(always)]
     fn limit<V: Simd>(&self, per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, work: &mut Work<'_>) -> Option<Limit> {
         let len = teeth.len;
@@ -1010,7 +1020,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
         if !self.has_gaps {
             work.closing[..len].fill(0.0);
         }
-        // Lent out: a tile that ends here goes the plain way, and takes the sweep with it.
+        // Taken temporarily: if the tile fails here, the whole sweep uses the plain path.
         let mut limit = std::mem::take(&mut work.limit);
         forces_at_stress(per_allowable, teeth, limit);
         {
@@ -1022,7 +1032,8 @@ impl<L: TwoParts> NoPowerLaw<L> {
                 let force = force[i] * per_typical;
                 let [slope, rest] = L::slope_and_rest::<V>(a[i], b[i], force);
                 let approach = force * (slope + rest);
-                // A tooth on which the law ends before is not the first to reach the stress, or it is seen below that the law has ended.
+                // If the law ends first on a tooth, that tooth does not limit the torque, or the end of the law is
+                // detected below.
                 let is_within = arm[i] > 0.0 && reach[i] - L::ln_of::<V>(force) > least_margin;
                 pressed[i] = if is_within { approach / arm[i] } else { f64::INFINITY };
             }
@@ -1045,8 +1056,9 @@ impl<L: TwoParts> NoPowerLaw<L> {
         least.filter(|_| is_done && is_within)
     }
 
-    /// Newton's method for all forces and the rotations together: each force follows the tangent of its law, and the rotation is the one at which the
-    /// tangents make the torque. A round costs one logarithm or root a state.
+    /// Newton's method for all forces and the rotations together. Each force follows the tangent of its law, and the
+    /// rotation is the one at which the tangents balance the torque. A round costs one logarithm or root for each
+    /// state.
     #[inline(always)]
     fn share_with<V: Simd, const GAPS: bool>(
         torque_nmm: f64,
@@ -1096,7 +1108,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
         false
     }
 
-    /// The tangents of all laws at the forces so far.
+    /// Computes the tangents of all laws at the current forces.
     #[inline(always)]
     fn tangents<V: Simd, const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &[f64]) {
         let len = teeth.len;
@@ -1117,11 +1129,11 @@ impl<L: TwoParts> NoPowerLaw<L> {
         }
     }
 
-    /// The forces at the new rotations; whether that was the last step.
+    /// Updates the forces to the new rotations. Returns true if that was the last step.
     #[inline(always)]
     fn follow<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
         let len = teeth.len;
-        // What was pressed before is what has a slope.
+        // A tooth that was pressed before has a slope.
         press::<GAPS>(teeth, work);
         let (arm, pressed, slope) = (&teeth.arm[..len], &work.pressed[..len], &work.slope[..len]);
         let (secant, offset) = (&work.secant[..len], &mut work.offset[..len]);
@@ -1132,7 +1144,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
                 let i = start + lane;
                 let before = force[i];
                 let by_tangent = offset[i] + slope[i] * pressed[i];
-                // Far from the tangent's point its root may be none; there the law's chord leads on.
+                // Far from the tangent's point its root may be meaningless; there the chord of the law is used.
                 let by_chord = arm[i] * pressed[i] * secant[i];
                 let next = if by_tangent > 0.5 * by_chord { by_tangent } else { by_chord };
                 let next = if next > NOTHING { next } else { NOTHING };
@@ -1141,7 +1153,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
                 let has_changed = GAPS && is_pressed != (slope[i] > 0.0) && arm[i] > 0.0;
                 let step = (next - before).abs() - LAST_FORCE_STEP * before - f64::EPSILON * f64::EPSILON;
                 let step = if has_changed { 1.0 } else { step };
-                // What the slope changes by along the step.
+                // Change of the slope along the step.
                 offset[i] *= (next - before) / (before * before);
                 force[i] = next;
                 *beyond = if step > *beyond || step.is_nan() { step } else { *beyond };
@@ -1150,7 +1162,8 @@ impl<L: TwoParts> NoPowerLaw<L> {
         beyond.iter().all(|&beyond| beyond <= 0.0)
     }
 
-    /// Forces in newtons, rotations and stiffnesses; false where a contact is wider than the law allows.
+    /// Converts the forces to newtons, and the stiffnesses accordingly. Returns false if a contact is wider than the
+    /// law allows.
     #[inline(always)]
     fn finish(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
         let (count, arm) = (teeth.count, &teeth.arm[..teeth.len]);
@@ -1167,7 +1180,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
         Self::cut_and_check(typical_n, teeth, work, shared.force) && is_finite
     }
 
-    /// Forces in newtons, none of teeth that are not pressed; whether all are within the law.
+    /// Converts forces to newtons, zero for teeth that are not pressed. Returns true if all are within the law.
     #[inline(always)]
     fn cut_and_check(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
         let len = teeth.len;

@@ -1,4 +1,4 @@
-//! What becomes of a tile: columns of all its states, or their peaks alone.
+//! Receivers of tiles: columns of all states, or peaks only.
 
 use std::iter::zip;
 use std::ops::Range;
@@ -11,21 +11,22 @@ use crate::drive::Drive;
 use crate::mesh::Place;
 use crate::sweep::columns::{AngleExtremes, Columns, ContactPeaks, InputAngles, Peak, PeakAt, States, SweepPeaks};
 
-/// Whoever takes tiles, in order.
+/// Receives tiles, in order.
 pub(super) trait Sink {
-    /// Whether it takes more of a state than its loads.
+    /// True if it uses more of a state than its loads.
     const COLUMNS: bool;
 
-    /// A tile with so many teeth at each input angle, of which the first is that of a sample; where the teeth of all zones are listed, with those of its lap.
+    /// Receives a tile with this many teeth at each input angle, starting at a sample. If the teeth of all zones are
+    /// listed, `listed` contains those of its lap.
     fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize, sample: u64, listed: &LapTeeth);
 }
 
-/// All columns.
+/// Receives all columns.
 pub(super) struct ColumnSink<'a> {
     laps: &'a Laps,
     states: States,
     input_angles: InputAngles,
-    /// Of force and stress.
+    /// Peaks of force and stress.
     peaks: PerContact<[RunningPeak; 2]>,
 }
 
@@ -40,7 +41,8 @@ impl<'a> ColumnSink<'a> {
         Self { laps, states, input_angles, peaks: PerContact::default() }
     }
 
-    /// The columns; where one zone stands for all with the last input angle, which repeats the first, every tooth one further.
+    /// Returns the columns. If one zone represents all, the last input angle repeats the first, every tooth one number
+    /// higher.
     pub(super) fn columns(self, torque_balance_residual: f64) -> Columns {
         let Self { laps, mut states, mut input_angles, peaks } = self;
         let peaks = PerContact::of(|contact| {
@@ -58,7 +60,7 @@ impl<'a> ColumnSink<'a> {
         Columns { states, input_angles, peaks, torque_balance_residual }
     }
 
-    /// Puts the teeth of all zones where they are listed.
+    /// Puts the teeth of all zones into their listed order.
     #[inline(always)]
     fn list(&mut self, drive: &Drive, tile: &Tile<'_>, teeth: usize, sample: u64, lap: &LapTeeth) {
         let Self { laps, states, input_angles, peaks } = self;
@@ -70,7 +72,7 @@ impl<'a> ColumnSink<'a> {
             input_angles.wind_up_deg[at] = tile.row_rotation_rad[row].to_degrees();
             let stiffness = InputAngles::of_output(drive, tile.row_stiffness[row]);
             input_angles.torsional_stiffness_nm_per_rad[at] = stiffness;
-            // One that stands for all that carry alike is listed as often.
+            // A tooth that represents several is listed as often.
             let loaded = tile.row_loaded[row] * listed / teeth;
             input_angles.loaded_teeth[at] = u32::try_from(loaded).unwrap_or(u32::MAX);
         }
@@ -117,7 +119,7 @@ impl<'a> ColumnSink<'a> {
     }
 }
 
-/// Each stretch of a column of teeth as they are listed that stands in the tile as it does there, with where it does.
+/// Calls a function for each chunk of a column whose teeth are adjacent in the tile too, with its index there.
 #[inline(always)]
 fn for_each_stretch(
     column: &mut [f64],
@@ -143,7 +145,7 @@ fn for_each_stretch(
     }
 }
 
-/// The value of each row for every tooth in it.
+/// Writes the value of each row for every tooth in it.
 #[inline(always)]
 fn repeat_rows(values: &[f64], listed: usize, column: &mut [f64]) {
     for (column, &value) in column.chunks_exact_mut(listed).zip(values) {
@@ -187,7 +189,7 @@ impl Sink for ColumnSink<'_> {
 
 const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
 
-/// The largest value of a growing column, and the first state of the tile that it stands in.
+/// Largest value of a growing column, and the first state of its tile.
 #[derive(Clone, Copy, Default)]
 struct RunningPeak {
     value: f64,
@@ -195,7 +197,7 @@ struct RunningPeak {
 }
 
 impl RunningPeak {
-    /// Appends unit loads times what scales them to the column, and looks at them while they are near.
+    /// Appends scaled unit loads to the column, and updates the peak while they are in the cache.
     #[inline(always)]
     fn append(&mut self, column: &mut Vec<f64>, unit: &[f64], factor: &[f64]) {
         let start = column.len();
@@ -203,7 +205,8 @@ impl RunningPeak {
         self.see(&column[start..], start);
     }
 
-    /// Looks at the states of a tile, of which the first is that of the column at `start`; of equal ones the first counts, whichever comes first.
+    /// Updates the peak with the states of a tile that begins at `start`. The first of equal values counts, in any
+    /// order of tiles.
     #[inline(always)]
     fn see(&mut self, of_tile: &[f64], start: usize) {
         let value = largest(of_tile);
@@ -212,14 +215,14 @@ impl RunningPeak {
         }
     }
 
-    /// The state itself.
+    /// Returns the state of the peak.
     fn find(&self, column: &[f64]) -> usize {
         self.start + column[self.start..].iter().position(|&value| value >= self.value).unwrap_or(0)
     }
 }
 
 impl AngleExtremes {
-    /// Those of a tile, too.
+    /// Includes the extremes of a tile.
     #[inline(always)]
     pub(super) fn take(&mut self, drive: &Drive, tile: &Tile<'_>, rows: usize) {
         for row in 0..rows {
@@ -229,20 +232,20 @@ impl AngleExtremes {
     }
 }
 
-/// Peaks alone.
+/// Receives peaks only.
 pub(super) struct PeakSink {
-    /// Of force and stress.
+    /// Peaks of force and stress.
     peaks: PerContact<[PlacedPeak; 2]>,
     angles: AngleExtremes,
 }
 
-/// The largest value so far, and the state where it stands.
+/// Largest value so far, and the state in which it occurs.
 #[derive(Clone, Copy, Default)]
 struct PlacedPeak {
     value: f64,
     input_angle_deg: f64,
     position_deg: f64,
-    /// The force there.
+    /// Force in that state, in N.
     force_n: f64,
 }
 
@@ -305,7 +308,7 @@ fn scale(column: &mut [f64], factor: &[f64], count: usize) {
 }
 
 impl States {
-    /// Appends the first `teeth` states again, a period on.
+    /// Appends the first `teeth` states again, one period later.
     fn repeat_first(&mut self, teeth: usize, input_angle_deg: f64) {
         self.input_angle_deg.extend(std::iter::repeat_n(input_angle_deg, teeth));
         self.tooth.extend_from_within(..teeth);

@@ -1,4 +1,5 @@
-//! Tiles: the columns of the states of a few input angles, small enough to stay in the first-level cache, and where their teeth stand.
+//! Tiles: columns of the states of a few input angles, small enough for the first-level cache, and the positions of
+//! their teeth.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::iter::zip;
@@ -12,7 +13,7 @@ use crate::mesh::{Mesh, Samples};
 use crate::position::Position;
 use crate::tooth::StressExponents;
 
-/// States of a tile, where one input angle has no more: its columns stay in the first-level cache.
+/// Number of states of a tile, unless one input angle has more: its columns fit in the first-level cache.
 const TILE: usize = 128;
 
 /// Sines and cosines of angles.
@@ -22,9 +23,10 @@ pub(super) struct SineTable {
 }
 
 impl SineTable {
-    /// Of `count` multiples of a step, at most [`TILE`], from 0 to at most a quarter of a turn: those of a few steps and those of a few strides, added.
+    /// Returns those of `count` multiples of a step, at most [`TILE`], from 0 to at most a quarter turn. They are sums
+    /// of a few steps and a few strides.
     fn equally_spaced(step_rad: f64, count: usize) -> Self {
-        // Strides are one or two more than a stride is long.
+        // There are one or two strides more than steps in a stride.
         const STRIDE: usize = TILE.isqrt() + 2;
         let sines = |step_rad: f64, count: usize| {
             let mut sines = [(0.0, 0.0); STRIDE];
@@ -47,31 +49,32 @@ impl SineTable {
 
 /// Input angles at which the same teeth mesh.
 ///
-/// There a tooth stands at the sum of three angles: its own at the start of the run, one of the tile and one of the input angle within
-/// the tile. The first and the last make a pattern that all tiles share, so that a tile takes the sine of a single angle. The teeth come
-/// nearer to the major axis, so only for the one next to it does such a sum cancel: it is counted from the end of the tile.
+/// The position of a tooth is a sum of three angles: its own at the start of the run, one of the tile, and one of the
+/// input angle within the tile. The first and the last form a pattern common to all tiles, so each tile needs the sine
+/// of one angle only. Teeth move towards the lobe, so the sum cancels only for the tooth next to it. That tooth is
+/// computed from the end of the tile.
 pub(super) struct Run {
     first: u64,
     end: u64,
     /// Samples of the period.
     of: Samples,
-    /// How many of them a sample is from the next.
+    /// Distance of successive samples.
     stride: u64,
     places: usize,
     pub(super) teeth: usize,
     layout: Layout,
-    /// Samples of a tile: equally many, but for the last.
+    /// Number of samples of a tile, except the last.
     rows: usize,
     mesh: Mesh,
-    /// Of the phase.
+    /// Step of the phase.
     step_rad: f64,
-    /// Steps of a whole turn.
+    /// Number of steps of a whole turn.
     steps: f64,
     lobes: f64,
 }
 
 impl Run {
-    /// Of the parts of a lap in which samples stand, from the first on.
+    /// Returns the run of the samples at parts of a lap, from the first part on.
     pub(super) fn from(first: u64, laps: &Laps, mesh: &Mesh, layout: Layout) -> Self {
         let (of, stride) = (laps.of_lap, laps.stride);
         let end = mesh.same_teeth_until(first, of);
@@ -95,22 +98,22 @@ impl Run {
         }
     }
 
-    /// The first samples of its tiles.
+    /// Returns the first samples of its tiles.
     pub(super) fn starts(&self) -> impl Iterator<Item = u64> + use<> {
         (self.first..self.end).step_by(whole(self.stride) * self.rows)
     }
 
-    /// The first sample beyond it.
+    /// Returns the first sample beyond it.
     pub(super) const fn next(&self) -> u64 {
         self.first + (self.end - self.first).div_ceil(self.stride) * self.stride
     }
 
-    /// Teeth that are at one place after another.
+    /// Returns the number of places.
     pub(super) const fn places(&self) -> usize {
         self.places
     }
 
-    /// Lays the pattern of its tiles.
+    /// Computes the pattern of its tiles.
     #[inline(always)]
     pub(super) fn lay_pattern(&self, tile: &mut Tile<'_>) {
         let Self { teeth, rows, places, layout, .. } = *self;
@@ -142,7 +145,7 @@ impl Run {
         }
     }
 
-    /// Positions of all teeth of the tile that begins with a sample, by sample and then tooth.
+    /// Computes the positions of all teeth of the tile that begins with a sample, by sample and then tooth.
     #[inline(always)]
     pub(super) fn place(&self, start: u64, tile: &mut Tile<'_>) {
         let rows = self.rows.min(whole((self.end - start).div_ceil(self.stride)));
@@ -174,7 +177,7 @@ impl Run {
             }
         }
         (tile.passed, tile.steps) = (passed, steps);
-        // The first tooth again, from where it will stand at the last sample.
+        // The first tooth, computed from its position at the last sample.
         let end = self.mesh.position_in_mesh(1, start + (rows as u64 - 1) * self.stride, self.of);
         for (row, to_end) in (0..rows).rev().enumerate() {
             let (row_sin, row_cos) = (tile.row_sines.sin[to_end], tile.row_sines.cos[to_end]);
@@ -186,19 +189,19 @@ impl Run {
     }
 }
 
-/// The most that the tiles of a sweep hold.
+/// Largest size of the tiles of a sweep.
 pub(super) struct TileSize {
-    /// States, with those that fill the last stretch and room for [`repeat_each`].
+    /// Number of states, with those that fill the last chunk and space for [`repeat_each`].
     len: usize,
-    /// Input angles.
+    /// Number of input angles.
     rows: usize,
-    /// Teeth at an input angle.
+    /// Number of teeth at an input angle.
     teeth: usize,
-    /// Whether there is more to a state than its loads.
+    /// True if a state has more columns than its loads.
     with_columns: bool,
-    /// Whether loads are more than unit loads times a number.
+    /// True if loads are more than scaled unit loads.
     with_work: bool,
-    /// Whether gaps are not the same at all teeth.
+    /// True if gaps are not the same at all teeth.
     with_gaps: bool,
 }
 
@@ -212,24 +215,24 @@ impl TileSize {
         Self { len, rows, teeth: most, with_columns, with_work: false, with_gaps: false }
     }
 
-    /// For input angles anywhere, with at most so many teeth, of which no more than the loads are wanted.
+    /// Returns the size for arbitrary input angles, with at most this many teeth and loads only.
     pub(super) fn anywhere(teeth: usize) -> Self {
         let rows = (TILE / teeth).max(1);
         let len = (rows * teeth).next_multiple_of(LANES) + VECTOR;
         Self { len, rows, teeth, with_columns: false, with_work: false, with_gaps: false }
     }
 
-    /// With room for what a law takes.
+    /// Returns the size with the memory that a law needs.
     pub(super) const fn with(self, with_work: bool, with_gaps: bool) -> Self {
         Self { with_work, with_gaps, ..self }
     }
 
-    /// Input angles of a tile.
+    /// Returns the number of input angles of a tile.
     pub(super) const fn rows(&self) -> usize {
         self.rows
     }
 
-    /// What all slices of a tile take together.
+    /// Returns the total number of doubles of a tile.
     pub(super) const fn doubles(&self) -> usize {
         let (of_columns, of_work) = (self.with_columns as usize, self.with_work as usize);
         let of_gaps = self.with_gaps as usize;
@@ -239,22 +242,21 @@ impl TileSize {
     }
 }
 
-/// Columns of the states of a few input angles: where they stand, their geometry, and what a unit rotation makes of them. All lie in one
-/// stretch of memory.
+/// Columns of the states of a few input angles: positions, geometry and unit loads. All are in one block of memory.
 pub(super) struct Tile<'a> {
-    /// States in it; lanes beyond the last one hold some tooth or other.
+    /// Number of states. Lanes beyond the last one contain arbitrary teeth.
     pub(super) count: usize,
-    /// Steps of the turn that have passed at its first input angle, and those of the whole.
+    /// Elapsed steps of the turn at its first input angle, and steps of the whole turn.
     pub(super) passed: f64,
     pub(super) steps: f64,
-    /// Of the steps from one input angle to the next.
+    /// Sines of the steps from one input angle to the next.
     pub(super) row_sines: SineTable,
     pub(super) tooth: Vec<u32>,
-    // Of the teeth at the start of the run.
+    // Teeth at the start of the run.
     pub(super) base_sin: &'a mut [f64],
     pub(super) base_cos: &'a mut [f64],
     pub(super) base_step: &'a mut [f64],
-    /// Where the tooth that may stand in the valley is among them.
+    /// Index of the tooth that may be in the valley.
     pub(super) last_place: usize,
     pub(super) pattern_sin: &'a mut [f64],
     pub(super) pattern_cos: &'a mut [f64],
@@ -267,31 +269,31 @@ pub(super) struct Tile<'a> {
     pub(super) center_radius_mm: &'a mut [f64],
     pub(super) wave_generator_angle_deg: &'a mut [f64],
     pub(super) ring_angle_deg: &'a mut [f64],
-    /// Over `scale`.
+    /// Forces over `scale`.
     pub(super) force: PerContact<&'a mut [f64]>,
-    /// Over the root of `scale`: the square root of lines, the cube root of balls; over `scale` itself at a flat.
+    /// Stresses over the root of `scale`: square root for lines, cube root for balls; over `scale` itself for a flat.
     pub(super) stress: PerContact<&'a mut [f64]>,
-    /// Of the forces over `scale`.
+    /// Torques of the forces over `scale`.
     pub(super) torque: PerContact<&'a mut [f64]>,
-    /// What makes loads of unit loads: `Δφ`, or `F_H` of each tooth.
+    /// Factor from unit loads to loads: `Δφ`, or `F_H` of each tooth.
     pub(super) scale: &'a mut [f64],
     pub(super) scale_root: &'a mut [f64],
     pub(super) stress_exponents: StressExponents,
-    /// For laws that are not linear.
+    /// Columns for laws that are not linear.
     pub(super) work: Work<'a>,
     pub(super) gaps: GapWork<'a>,
-    // By input angle.
+    // Columns by input angle.
     pub(super) row_torque: PerContact<&'a mut [f64]>,
     pub(super) row_input_angle_deg: &'a mut [f64],
     pub(super) row_rotation_rad: &'a mut [f64],
     pub(super) row_rotation_root: &'a mut [f64],
     pub(super) row_stiffness: &'a mut [f64],
-    /// Teeth that carry.
+    /// Number of carrying teeth.
     pub(super) row_loaded: Vec<usize>,
     pub(super) row_residual: &'a mut [f64],
 }
 
-/// A stretch of a tile: where its states stand, and room for their loads.
+/// Chunk of a tile: positions of its states, and space for their loads.
 pub(super) struct TileLanes<'t> {
     pub(super) sin: &'t [f64; LANES],
     pub(super) cos: &'t [f64; LANES],
@@ -383,18 +385,19 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// What makes stresses of unit stresses.
+    /// Returns the factor from unit stresses to stresses.
     #[inline(always)]
     pub(super) const fn stress_scale(&self, contact: Contact) -> &[f64] {
         if self.stress_exponents.is_one_at(contact) { self.scale } else { self.scale_root }
     }
 
-    /// The position of a state.
+    /// Returns the position of a state in deg.
     pub(super) fn position_deg_of(&self, state: usize) -> f64 {
         360.0 * (self.pattern_step[state] - self.passed) / self.steps
     }
 
-    /// Torques summed over the teeth at each input angle, of unit loads or of them all; how many of these there are.
+    /// Sums the torques, of unit loads or loads, over the teeth at each input angle. Returns the number of input
+    /// angles.
     #[inline(always)]
     pub(super) fn sum_torques<const OF_UNIT_LOADS: bool>(&mut self, teeth: usize) -> usize {
         let rows = self.count / teeth;

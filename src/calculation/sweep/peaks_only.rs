@@ -1,25 +1,25 @@
-//! A sweep without its columns, as a batch answers it with `peaks_only`.
+//! A sweep without its columns: the answer of a batch with `peaks_only`.
 
+use crate::coincidence_degree::TeethInMeshAnswer;
+use crate::design::{Design, ModelDocument};
+use crate::findings::FindingAnswer;
+use crate::forms::{Form, Format, Forms};
+use crate::key::Encode;
+use crate::no_answer::NoAnswer;
+use crate::question::{Limits, Question, Stop};
+use crate::sweep::Sweep;
+use crate::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
+use crate::sweep::backing::EstimateAnswer;
+use crate::sweep::duty::DutyAnswer;
+use crate::sweep::losses::LossTotalsAnswer;
+use crate::sweep::model_error::ModelErrorAnswer;
 use serde::{Serialize, Serializer};
-use toothwave_calculation::coincidence_degree::TeethInMeshAnswer;
-use toothwave_calculation::design::{Design, ModelDocument};
-use toothwave_calculation::findings::FindingAnswer;
-use toothwave_calculation::forms::{Form, Format, Forms};
-use toothwave_calculation::key::Encode;
-use toothwave_calculation::no_answer::NoAnswer;
-use toothwave_calculation::question::{Limits, Question, Stop};
-use toothwave_calculation::sweep::Sweep;
-use toothwave_calculation::sweep::answer::{ChecksAnswer, LoadAnswer, PeaksAnswer, SweepAnswer, TorqueCapacityAnswer};
-use toothwave_calculation::sweep::backing::EstimateAnswer;
-use toothwave_calculation::sweep::duty::DutyAnswer;
-use toothwave_calculation::sweep::losses::LossTotalsAnswer;
-use toothwave_calculation::sweep::model_error::ModelErrorAnswer;
 
-/// What a sweep is asked without its columns.
+/// The question for a sweep without columns.
 #[derive(Debug)]
 pub struct PeaksOnly;
 
-/// A sweep that is written without its columns.
+/// The answer of a sweep without columns.
 #[derive(Debug)]
 pub struct PeaksOnlyAnswer(SweepAnswer);
 
