@@ -1,4 +1,4 @@
-//! Curves as few arcs with one tangent where they meet, for what draws in lines and arcs (docs/theory.md section 8).
+//! Curves as few arcs with one tangent where they meet, for what draws in lines and arcs (docs/explanation/theory.md section 8).
 
 use nalgebra::{Point2, Unit, Vector2};
 

@@ -1,4 +1,4 @@
-//! Outlines of the parts' sections: circles, and closed paths of lines, arcs and sampled curves (docs/theory.md section 8).
+//! Outlines of the parts' sections: circles, and closed paths of lines, arcs and sampled curves (docs/explanation/theory.md section 8).
 
 use nalgebra::{Point2, Rotation2, Unit, Vector2};
 
