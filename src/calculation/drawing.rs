@@ -99,6 +99,10 @@ impl Question for Drawing {
     }
 
     fn max_bytes(checked: &CheckedDrawing, format: Format) -> Option<u64> {
+        // The chords of a mesh are known only when it is made.
+        if matches!(format, Format::ThreeMf | Format::Stl) {
+            return None;
+        }
         // A solid has fewer poles than points. The text of a point is longest in STEP.
         let text_bytes = if format == Format::Step { STEP_POINT_BYTES } else { 60 };
         Some((POINT_BYTES + POLE_BYTES + text_bytes) * checked.drawing.expected_points())
