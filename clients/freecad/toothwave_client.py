@@ -98,7 +98,7 @@ class Service:
         for left in reversed(range(ATTEMPTS)):
             try:
                 request = self._request(path, body, known)
-                with urllib.request.urlopen(request, timeout=self.timeout_s) as response:
+                with opener_for(request.host).open(request, timeout=self.timeout_s) as response:
                     return _strong(response.headers["ETag"]), json.load(response)
             except urllib.error.HTTPError as error:
                 with error:
@@ -157,6 +157,13 @@ def address_of(text):
     return address.rstrip("/")
 
 
+def opener_for(host):
+    """Opens addresses of this host. This machine is reached without a proxy, whatever `http_proxy` says."""
+    name = urllib.parse.urlsplit(f"//{host}").hostname
+    is_loopback = name in ("localhost", "::1") or name.startswith("127.")
+    return urllib.request.build_opener(urllib.request.ProxyHandler({} if is_loopback else None))
+
+
 def pause_of(retry_after):
     """How long to wait, as the header `Retry-After` says it: in seconds, or by a date."""
     text = (retry_after or "").strip()
@@ -171,4 +178,4 @@ def pause_of(retry_after):
 
 def _strong(tag):
     """An entity tag without the mark that a proxy sets when it has compressed the answer."""
-    return tag and tag.removeprefix("W/")
+    return tag[2:] if tag and tag.startswith("W/") else tag

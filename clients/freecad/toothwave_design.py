@@ -283,7 +283,8 @@ def _join(document, others, place=""):
 
 
 # Properties of drives in files of earlier versions, and where their values stood in the document.
-RETIRED = {f"{_named(label)}GapUm": f"/model/clearance/{contact}_um" for contact, label in CONTACTS} | {
+RETIRED = {
+    **{f"{_named(label)}GapUm": f"/model/clearance/{contact}_um" for contact, label in CONTACTS},
     "RingTeethBend": "/model/ring_teeth_bend",
     "WaveGeneratorMoves": "/model/wave_generator_moves",
     "CornerContact": "/model/corner_contact",
@@ -314,7 +315,7 @@ def converted(document):
         gap, given = gaps.get(f"{part}_um", 0.0), parts.get(part) or {}
         made = given.get("clearance_um", 0.0) + teeth
         if gap and not made:
-            parts[part] = given | {"clearance_um": gap}
+            parts[part] = {**given, "clearance_um": gap}
         elif gap and gap != made:
             contradicted[f"{part}_um"] = gap
     if contradicted:
@@ -328,8 +329,8 @@ def converted(document):
         chosen = auto + [key for key, value in zip(SWITCHES, (bend, moves, corner)) if value]
         if chosen != ["auto"]:
             model["refinements"] = chosen or "none"
-    changed = {key: value for key, value in (("model", model), ("parts", parts)) if value}
-    return {key: value for key, value in document.items() if key not in ("model", "parts")} | changed
+    kept = {key: value for key, value in document.items() if key not in ("model", "parts")}
+    return {**kept, **{key: value for key, value in (("model", model), ("parts", parts)) if value}}
 
 
 def values_of(document):

@@ -1,11 +1,14 @@
 //! Each mating part, or all of them in place, as outlines for CAD, workshops and eyes.
 
+use std::borrow::Cow;
+
 use toothwave_solver::drawing as solver;
 use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::{SolveError, Stop};
 
 use crate::design::Design;
 use crate::drawing::answer::{BodyAnswer, DrawingAnswer, DrawnPart, EdgeAnswer, OutlineAnswer};
+use crate::drawing::preset::Preset;
 use crate::findings::{Causes, FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};
 use crate::key::{Encode, Key};
@@ -14,12 +17,21 @@ use crate::question::{Limits, Question};
 
 pub mod answer;
 mod dxf;
+mod mesh;
+pub mod preset;
 mod step;
+mod stl;
 mod svg;
+mod three_mf;
 
 /// What is asked.
 #[derive(Debug)]
-pub struct Drawing(pub DrawnPart);
+pub struct Drawing {
+    /// What is drawn.
+    pub part: DrawnPart,
+    /// What its clearances are for.
+    pub preset: Preset,
+}
 
 /// A drawing that can be made.
 #[derive(Debug)]
@@ -47,22 +59,28 @@ impl Question for Drawing {
     type Answer = DrawingAnswer;
 
     fn name(&self) -> &'static str {
-        match self.0 {
-            DrawnPart::Ring => "drawings/ring",
-            DrawnPart::WaveGenerator => "drawings/wave-generator",
-            DrawnPart::Carrier => "drawings/carrier",
-            DrawnPart::Tooth => "drawings/tooth",
-            DrawnPart::Assembly => "drawings/assembly",
+        match (self.part, self.preset) {
+            (DrawnPart::Ring, Preset::Document) => "drawings/ring",
+            (DrawnPart::WaveGenerator, Preset::Document) => "drawings/wave-generator",
+            (DrawnPart::Carrier, Preset::Document) => "drawings/carrier",
+            (DrawnPart::Tooth, Preset::Document) => "drawings/tooth",
+            (DrawnPart::Assembly, Preset::Document) => "drawings/assembly",
+            (DrawnPart::Ring, Preset::Printing) => "drawings/ring, printing",
+            (DrawnPart::WaveGenerator, Preset::Printing) => "drawings/wave-generator, printing",
+            (DrawnPart::Carrier, Preset::Printing) => "drawings/carrier, printing",
+            (DrawnPart::Tooth, Preset::Printing) => "drawings/tooth, printing",
+            (DrawnPart::Assembly, Preset::Printing) => "drawings/assembly, printing",
         }
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        let assembly = (self.0 == DrawnPart::Assembly).then_some(&design.assembly);
+        let assembly = (self.part == DrawnPart::Assembly).then_some(&design.assembly);
         (&design.drive, design.parts_in_key(), &design.modification, design.profile.chord_tolerance_mm, assembly)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedDrawing, NoAnswer> {
-        let subject = self.0;
+        let drawn = self.as_drawn(design);
+        let (subject, design) = (self.part, &*drawn);
         let of_design = (&design.drive, design.parts_in_key(), &design.modification, design.profile.chord_tolerance_mm);
         let parameters = design.drawing_parameters(limits.max_profile_points);
         let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
@@ -88,6 +106,10 @@ impl Question for Drawing {
     }
 
     fn max_bytes(checked: &CheckedDrawing, format: Format) -> Option<u64> {
+        // The chords of a mesh are known only when it is made.
+        if matches!(format, Format::ThreeMf | Format::Stl) {
+            return None;
+        }
         // A solid has fewer poles than points. The text of a point is longest in STEP.
         let text_bytes = if format == Format::Step { STEP_POINT_BYTES } else { 60 };
         Some((POINT_BYTES + POLE_BYTES + text_bytes) * checked.drawing.expected_points())
@@ -113,6 +135,16 @@ impl Question for Drawing {
     }
 }
 
+impl Drawing {
+    /// The design with the preset's clearances.
+    fn as_drawn<'a>(&self, design: &'a Design) -> Cow<'a, Design> {
+        match self.preset {
+            Preset::Document => Cow::Borrowed(design),
+            Preset::Printing => Cow::Owned(preset::printed(design)),
+        }
+    }
+}
+
 impl DrawingAnswer {
     /// Points of all curves, and poles of the polynomials that solids have in their place.
     fn points_and_poles(&self) -> (usize, usize) {
@@ -131,8 +163,13 @@ impl DrawingAnswer {
 }
 
 impl Forms for DrawingAnswer {
-    const FORMS: &'static [(Format, Form<Self>)] =
-        &[(Format::Svg, svg::write), (Format::Dxf, dxf::write), (Format::Step, step::write)];
+    const FORMS: &'static [(Format, Form<Self>)] = &[
+        (Format::Svg, svg::write),
+        (Format::Dxf, dxf::write),
+        (Format::Step, step::write),
+        (Format::ThreeMf, three_mf::write),
+        (Format::Stl, stl::write),
+    ];
 
     fn expected_bytes(&self) -> usize {
         // Two numbers of about 18 characters, each with its comma.
@@ -144,6 +181,7 @@ impl Forms for DrawingAnswer {
         const RECORDS_BYTES: u64 = 320;
         let (points, poles) = self.points_and_poles();
         let of_records = if format == Format::Step { RECORDS_BYTES } else { 0 };
-        POINT_BYTES * points as u64 + (POLE_BYTES + of_records) * poles as u64
+        let of_meshes = if matches!(format, Format::ThreeMf | Format::Stl) { mesh::held_bytes(self) } else { 0 };
+        POINT_BYTES * points as u64 + (POLE_BYTES + of_records) * poles as u64 + of_meshes
     }
 }

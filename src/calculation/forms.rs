@@ -2,9 +2,11 @@
 
 use std::io::{self, Write};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use crate::columns;
+use crate::decimal_comma::DecimalComma;
 
 /// A format of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,6 +15,8 @@ pub enum Format {
     Json,
     /// Columns as comma-separated values.
     Csv,
+    /// The same with a decimal comma and semicolons between fields.
+    CsvComma,
     /// Columns as an Apache Arrow IPC stream.
     Arrow,
     /// Columns as an Apache Parquet file.
@@ -25,17 +29,73 @@ pub enum Format {
     Dxf,
     /// Solids for CAD.
     Step,
+    /// Meshes for printers.
+    ThreeMf,
+    /// One mesh for printers that read nothing else.
+    Stl,
 }
 
 impl Format {
+    /// Its media type, with parameters.
+    pub const fn media_type(self) -> &'static str {
+        match self {
+            Self::Json => "application/json",
+            Self::Csv | Self::CsvComma => "text/csv; charset=utf-8; header=present",
+            Self::Arrow => "application/vnd.apache.arrow.stream",
+            Self::Parquet => "application/vnd.apache.parquet",
+            Self::Text => "text/plain; charset=utf-8",
+            Self::Svg => "image/svg+xml",
+            Self::Dxf => "image/vnd.dxf",
+            Self::Step => "model/step",
+            Self::ThreeMf => "model/3mf",
+            Self::Stl => "model/stl",
+        }
+    }
+
+    /// The format that an answer offers: CSV, whatever its decimal sign.
+    pub const fn offered(self) -> Self {
+        if matches!(self, Self::CsvComma) { Self::Csv } else { self }
+    }
+
     /// True if it writes every number of the answer.
     pub const fn writes_all_numbers(self) -> bool {
-        matches!(self, Self::Json | Self::Csv | Self::Arrow | Self::Parquet)
+        matches!(self, Self::Json | Self::Csv | Self::CsvComma | Self::Arrow | Self::Parquet)
     }
 
     /// Bytes of numbers and of their text: a number has 8 bytes, its text about 20.
     pub const fn bytes_with_text(self, numbers_bytes: u64) -> u64 {
         if self.writes_all_numbers() { numbers_bytes * 7 / 2 } else { numbers_bytes }
+    }
+}
+
+/// How CSV is written.
+#[derive(Debug, Clone, Copy, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields, default)]
+#[into_params(parameter_in = Query)]
+pub struct CsvOptions {
+    /// Decimal sign of numbers in CSV. With `comma` a semicolon separates fields.
+    #[param(inline, required = false)]
+    pub decimal: Decimal,
+}
+
+/// A decimal sign.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Decimal {
+    /// `1.5`
+    #[default]
+    Point,
+    /// `1,5`
+    Comma,
+}
+
+impl Decimal {
+    /// CSV with this sign; every other format as it is.
+    pub const fn of(self, format: Format) -> Format {
+        match (self, format) {
+            (Self::Comma, Format::Csv) => Format::CsvComma,
+            _ => format,
+        }
     }
 }
 
@@ -68,7 +128,8 @@ pub trait Forms: Serialize + Sized + 'static {
     /// # Errors
     /// The errors of the writer.
     fn write(&self, format: Format, writer: &mut impl Write) -> io::Result<()> {
-        match Self::FORMS.iter().find(|(known, _)| *known == format) {
+        match Self::FORMS.iter().find(|(known, _)| *known == format.offered()) {
+            Some((_, form)) if format == Format::CsvComma => form(self, &mut DecimalComma::new(writer)),
             Some((_, form)) => form(self, writer),
             None => columns::write(self, writer),
         }

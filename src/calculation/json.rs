@@ -48,6 +48,12 @@ pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
 /// # Errors
 /// See [`ReadError`].
 pub fn tree(text: &[u8]) -> Result<Tree, ReadError> {
+    if matches!(text, [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] | [0, _, ..] | [_, 0, ..]) {
+        // In UTF-16 every ASCII letter has a byte that is zero.
+        let detail =
+            "the document is UTF-16; save it as UTF-8 (in Windows PowerShell `| Out-File -Encoding utf8`, not `>`)";
+        return Err(ReadError::Malformed { detail: detail.into() });
+    }
     let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     if text.trim_ascii().is_empty() {
         return Err(ReadError::Malformed { detail: "the body is empty. Send a design document".into() });

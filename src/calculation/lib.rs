@@ -12,6 +12,7 @@ mod arithmetic;
 pub mod coincidence_degree;
 pub mod columns;
 pub mod convert;
+mod decimal_comma;
 pub mod design;
 pub mod drawing;
 pub mod field;

@@ -25,13 +25,17 @@ impl KindSchema {
         Self { word, name, fields: T::schema() }
     }
 
-    /// The fields with the word, which is required, so that readers can tell the kinds apart by it alone.
-    fn with_word(&self, tag: &str) -> RefOr<Schema> {
+    /// The fields with the word. It is required unless this kind is meant where it is left out.
+    fn with_word(&self, tag: &str, by_default: &[&str]) -> RefOr<Schema> {
         let mut schema = self.fields.clone();
         if let RefOr::T(Schema::Object(object)) = &mut schema {
-            let word = ObjectBuilder::new().schema_type(Type::String).enum_values(Some([self.word]));
+            let mut word = ObjectBuilder::new().schema_type(Type::String).enum_values(Some([self.word]));
+            if by_default.contains(&self.word) {
+                word = word.default(Some(self.word.into()));
+            } else {
+                object.required.insert(0, tag.into());
+            }
             object.properties.insert(tag.into(), Schema::Object(word.build()).into());
-            object.required.insert(0, tag.into());
         }
         schema
     }
@@ -39,24 +43,15 @@ impl KindSchema {
     fn reference(&self) -> Ref {
         Ref::from_schema_name(&self.name)
     }
-
-    /// The name of the kind that is meant where the word is left out.
-    fn name_by_default(&self) -> String {
-        format!("{}ByDefault", self.name)
-    }
 }
 
-/// One of these kinds.
+/// One of these kinds. Generators read no discriminator that a kind may lack: with a default the kinds are told apart by their words alone.
 pub(crate) fn schema(description: &str, tag: &str, kinds: &[KindSchema], by_default: &[&str]) -> RefOr<Schema> {
     let mapping = kinds.iter().map(|kind| (kind.word, kind.reference().ref_location));
-    let mut union = OneOfBuilder::new()
-        .description(Some(description.trim()))
-        .discriminator(Some(Discriminator::with_mapping(tag, mapping)));
+    let discriminator = by_default.is_empty().then(|| Discriminator::with_mapping(tag, mapping));
+    let mut union = OneOfBuilder::new().description(Some(description.trim())).discriminator(discriminator);
     for kind in kinds {
         union = union.item(kind.reference());
-    }
-    for kind in kinds.iter().filter(|kind| by_default.contains(&kind.word)) {
-        union = union.item(Ref::from_schema_name(kind.name_by_default()));
     }
     union.into()
 }
@@ -68,12 +63,7 @@ pub(crate) fn schemas(
     by_default: &[&str],
     schemas: &mut Vec<(String, RefOr<Schema>)>,
 ) {
-    for kind in kinds {
-        schemas.push((kind.name.clone(), kind.with_word(tag)));
-        if by_default.contains(&kind.word) {
-            schemas.push((kind.name_by_default(), kind.fields.clone()));
-        }
-    }
+    schemas.extend(kinds.iter().map(|kind| (kind.name.clone(), kind.with_word(tag, by_default))));
 }
 
 /// Makes an enum of kinds of object. It is written with its word always, read as [`crate::json`] reads unions, and in the API document it is a

@@ -5,10 +5,15 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point2, Rotation2, Unit, Vector2};
 
+use crate::arcs;
+pub use crate::arcs::ArcStart;
+use crate::cam::Cam;
 use crate::contact::Part;
 use crate::drive::{Draft, Drive, DriveError};
 use crate::findings::{self, Finding};
 use crate::gaps::RAD_PER_ARCSEC;
+pub use crate::outline::{Edge, Outline, SPLINE_SHARE_OF_CHORD, Section};
+use crate::outline::{POINTS_PER_CHORD, chords, ends_of_chords};
 use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
 use crate::profile::{
     Density, Extent, Polyline, ProfileParameters, SampledCurve, cam_half_lobe, cam_outline, direction, expected_points,
@@ -26,127 +31,6 @@ pub enum Subject {
     Part(Part),
     /// All of them in the ring's frame, at an input angle.
     Assembly,
-}
-
-/// How far polynomials may be from their curve, as a share of the chord tolerance: as little as solids of tolerance 1e-3 mm need to touch each other
-/// within 10 nm.
-pub const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
-
-/// Points for each chord of the drawing that polynomials are laid through and held against: where a tip bends most, points that only just carry chords
-/// do not tell what the curve does between them.
-const POINTS_PER_CHORD: u32 = 4;
-
-/// A closed path. Each edge starts at the very point where the one before ends, the first where the last ends.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Outline {
-    /// A circle around the origin.
-    Circle {
-        /// Its radius.
-        radius_mm: f64,
-    },
-    /// Edges, counter-clockwise.
-    Edges(Vec<Edge>),
-}
-
-/// A piece of an outline.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Edge {
-    /// A straight line.
-    Line {
-        /// Where it starts.
-        start: Point2<f64>,
-        /// Where it ends.
-        end: Point2<f64>,
-    },
-    /// An arc of a circle around the origin.
-    Arc {
-        /// Where it starts.
-        start: Point2<f64>,
-        /// Where it ends.
-        end: Point2<f64>,
-        /// Radius of the circle.
-        radius_mm: f64,
-        /// Its angle, counter-clockwise positive, within a full turn.
-        sweep_rad: f64,
-    },
-    /// A smooth curve through points that are exact, its chords true to the tolerance.
-    Curve {
-        /// The points, both ends included.
-        points: Polyline,
-        /// Direction at the first point.
-        start_tangent: Unit<Vector2<f64>>,
-        /// Direction at the last point.
-        end_tangent: Unit<Vector2<f64>>,
-        /// Bézier's polygons of polynomials that follow each other along it with one tangent, within [`SPLINE_SHARE_OF_CHORD`] of the
-        /// tolerance.
-        polynomials: Vec<Polyline>,
-    },
-}
-
-impl Edge {
-    /// Where it starts.
-    pub fn start(&self) -> Point2<f64> {
-        match self {
-            Self::Line { start, .. } | Self::Arc { start, .. } => *start,
-            Self::Curve { points, .. } => points.first().copied().unwrap_or_default(),
-        }
-    }
-
-    /// Where it ends.
-    pub fn end(&self) -> Point2<f64> {
-        match self {
-            Self::Line { end, .. } | Self::Arc { end, .. } => *end,
-            Self::Curve { points, .. } => points.last().copied().unwrap_or_default(),
-        }
-    }
-
-    /// The same turned about the origin.
-    fn turned(&self, rotation: &Rotation2<f64>) -> Self {
-        let tangent = |tangent: &Unit<Vector2<f64>>| Unit::new_unchecked(rotation * tangent.into_inner());
-        let turned = |points: &Polyline| -> Polyline { points.iter().map(|point| rotation * point).collect() };
-        match self {
-            Self::Line { start, end } => Self::Line { start: rotation * start, end: rotation * end },
-            Self::Arc { start, end, radius_mm, sweep_rad } => {
-                Self::Arc { start: rotation * start, end: rotation * end, radius_mm: *radius_mm, sweep_rad: *sweep_rad }
-            }
-            Self::Curve { points, start_tangent, end_tangent, polynomials } => Self::Curve {
-                points: turned(points),
-                start_tangent: tangent(start_tangent),
-                end_tangent: tangent(end_tangent),
-                polynomials: polynomials.iter().map(turned).collect(),
-            },
-        }
-    }
-
-    /// A curve that has [`POINTS_PER_CHORD`].
-    fn curve(sampled: &SampledCurve, chord_tolerance_mm: f64) -> Self {
-        let SampledCurve { points, tangents } = sampled;
-        Self::Curve {
-            points: ends_of_chords(points),
-            start_tangent: tangents[0],
-            end_tangent: tangents[tangents.len() - 1],
-            polynomials: spline::polygons(sampled, SPLINE_SHARE_OF_CHORD * chord_tolerance_mm),
-        }
-    }
-
-    /// Lets a curve end at the very point where the next edge starts.
-    fn end_at(&mut self, next: Point2<f64>) {
-        if let Self::Curve { points, polynomials, .. } = self {
-            for polygon in polynomials.last_mut().into_iter().chain([points]) {
-                polygon.pop();
-                polygon.push(next);
-            }
-        }
-    }
-}
-
-/// A face: an outline with holes in it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Section {
-    /// What bounds it.
-    pub outer: Outline,
-    /// What is cut out of it.
-    pub holes: Vec<Outline>,
 }
 
 /// Where a section stands: turned about its origin, then moved.
@@ -271,7 +155,11 @@ impl Drawing {
 
     /// About how many points its curves have: no fewer, and some times as many.
     pub fn expected_points(&self) -> u64 {
-        let has_curves = |part: &MadePart| matches!(part, MadePart::Ring(_) | MadePart::WaveGenerator(_));
+        let has_curves = |part: &MadePart| match part {
+            MadePart::Ring(_) => true,
+            MadePart::WaveGenerator(cam) => self.cam_circle(cam).is_none(),
+            MadePart::Carrier(_) | MadePart::Teeth(_) => false,
+        };
         if !self.parts.iter().any(has_curves) {
             return 0;
         }
@@ -331,11 +219,30 @@ impl Drawing {
                 None => {}
             }
         }
-        Ok(Section { outer: Outline::Circle { radius_mm: ring.outer_radius_mm }, holes: vec![Outline::Edges(edges)] })
+        Ok(Section { outer: Outline::circle(ring.outer_radius_mm), holes: vec![Outline::Edges(edges)] })
     }
 
-    /// The wave generator: a curve from each lobe to each valley and on.
+    /// The wave generator: an eccentric circle, or a curve from each lobe to each valley and on.
     fn cam_section(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Section, SolveError> {
+        let outer = match self.cam_circle(cam) {
+            Some(circle) => circle,
+            None => Outline::Edges(self.cam_edges(cam, stop)?),
+        };
+        Ok(Section { outer, holes: cam.bore_radius_mm.map(Outline::circle).into_iter().collect() })
+    }
+
+    /// The outline of an eccentric, whose lobe is along x.
+    fn cam_circle(&self, cam: &WaveGeneratorPart) -> Option<Outline> {
+        match self.drive.flank().locus().cam() {
+            Cam::Harmonic(harmonic) if harmonic.is_circle() => Some(Outline::Circle {
+                center: Point2::new(harmonic.amplitude_mm(), 0.0),
+                radius_mm: harmonic.mean_radius_mm() - cam.set_back_mm,
+            }),
+            _ => None,
+        }
+    }
+
+    fn cam_edges(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Vec<Edge>, SolveError> {
         let (locus, lobes) = (self.drive.flank().locus(), self.drive.lobes());
         let half_lobe = cam_half_lobe(locus, cam.set_back_mm, self.density(), stop)?;
         let half = chords(&half_lobe.points);
@@ -365,16 +272,27 @@ impl Drawing {
             };
             degrees.into_iter().map(polygon).collect()
         };
-        let edges = (0..2 * lobes).zip((0..).step_by(half)).map(|(index, start)| Edge::Curve {
+        // And the arcs, whose angles are the same from either end.
+        let half_arcs = arcs::arcs(&half_lobe, self.parameters.chord_tolerance_mm);
+        let corners: Polyline = half_arcs.iter().map(|arc| arc.point).chain(half_lobe.points.last().copied()).collect();
+        let whole_corners = cam_outline(&corners, lobes);
+        let arcs = |index: u32, first: usize| {
+            let mut bulges: Vec<_> = half_arcs.iter().map(|arc| arc.bulge).collect();
+            if index % 2 == 1 {
+                bulges.reverse();
+            }
+            let arc = |(point, bulge): (&Point2<f64>, f64)| ArcStart { point: *point, bulge };
+            whole_corners[first..].iter().zip(bulges).map(arc).collect()
+        };
+        let starts = (0..).step_by(half).zip((0..).step_by(half_arcs.len()));
+        let edges = (0..2 * lobes).zip(starts).map(|(index, (start, first_arc))| Edge::Curve {
             points: whole[start..=start + half].to_vec(),
             start_tangent: across(index),
             end_tangent: across((index + 1) % (2 * lobes)),
             polynomials: polynomials(index),
+            arcs: arcs(index, first_arc),
         });
-        Ok(Section {
-            outer: Outline::Edges(edges.collect()),
-            holes: cam.bore_radius_mm.map(|radius_mm| Outline::Circle { radius_mm }).into_iter().collect(),
-        })
+        Ok(edges.collect())
     }
 
     /// One finger of the carrier: what stands between slot 0, along x, and slot 1. Where the slots run into each other
@@ -435,15 +353,6 @@ impl Drawing {
     }
 }
 
-/// Chords of a curve that has [`POINTS_PER_CHORD`].
-const fn chords(points: &Polyline) -> usize {
-    (points.len() - 1) / POINTS_PER_CHORD as usize
-}
-
-fn ends_of_chords(points: &Polyline) -> Polyline {
-    points.iter().step_by(POINTS_PER_CHORD as usize).copied().collect()
-}
-
 /// A tooth space of the ring, its middle along x, from tip to tip.
 fn tooth_space(half: HalfSpace, chord_tolerance_mm: f64) -> Vec<Edge> {
     let root_arc_rad = half.root_arc_rad;
@@ -500,7 +409,7 @@ fn tooth_section(tooth: &ToothPart) -> Section {
             Edge::Line { start: left[1], end: right[0] },
         ])
     } else {
-        Outline::Circle { radius_mm }
+        Outline::circle(radius_mm)
     };
     Section { outer, holes: Vec::new() }
 }

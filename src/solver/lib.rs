@@ -33,6 +33,7 @@
 //! its geometry and its mesh. With a [`LoadCase`] it computes a [`sweep()`](sweep::sweep) over one period.
 
 pub mod approach;
+mod arcs;
 pub mod backing;
 pub mod backlash;
 pub mod cam;
@@ -46,6 +47,7 @@ pub mod locus;
 pub mod losses;
 pub mod mesh;
 pub mod model_error;
+mod outline;
 pub mod parts;
 pub mod position;
 pub mod profile;

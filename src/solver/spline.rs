@@ -25,8 +25,16 @@ pub(crate) fn polygons(curve: &SampledCurve, tolerance_mm: f64) -> Vec<Polyline>
             .map(|inner| measured.polygon(from, to, inner))
             .find(|polygon| measured.is_near(polygon, from, to, tolerance_mm))
     };
-    let is_one = |from: usize, to: usize| lowest(from, to, INNER..=INNER).is_some();
-    let last = curve.points.len() - 1;
+    let ends = ends_of_pieces(curve.points.len() - 1, |from, to| lowest(from, to, INNER..=INNER).is_some());
+    let of_piece = |ends: &[usize]| {
+        lowest(ends[0], ends[1], 0..=INNER).unwrap_or_else(|| measured.polygon(ends[0], ends[1], INNER))
+    };
+    ends.windows(2).map(of_piece).collect()
+}
+
+/// Where a curve from its point 0 to its last one is cut into few pieces that may be one, both ends included: the longest from either end, and of the rest
+/// two halves where these may be.
+pub(crate) fn ends_of_pieces(last: usize, is_one: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     let (mut from, mut to) = (0, last);
     let mut ends = vec![from, to];
     while from < to && !is_one(from, to) {
@@ -35,17 +43,13 @@ pub(crate) fn polygons(curve: &SampledCurve, tolerance_mm: f64) -> Vec<Polyline>
             ends.push(middle);
             break;
         }
-        // The longest from either end.
         from += largest(to - from, |points| is_one(from, from + points));
         to -= largest(to - from, |points| is_one(to - points, to));
         ends.extend([from, to]);
     }
     ends.sort_unstable();
     ends.dedup();
-    let of_piece = |ends: &[usize]| {
-        lowest(ends[0], ends[1], 0..=INNER).unwrap_or_else(|| measured.polygon(ends[0], ends[1], INNER))
-    };
-    ends.windows(2).map(of_piece).collect()
+    ends
 }
 
 /// The largest number up to a limit for which something holds, as it does for all smaller ones; one at least.

@@ -68,6 +68,7 @@ impl utoipa::PartialSchema for Base {
         utoipa::openapi::ObjectBuilder::new()
             .schema_type(utoipa::openapi::schema::Type::Object)
             .description(Some("A design document. The study sets the fields that it varies."))
+            .additional_properties(Some(utoipa::openapi::schema::AdditionalProperties::FreeForm(true)))
             .into()
     }
 }

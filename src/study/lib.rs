@@ -29,7 +29,7 @@ pub use document::*;
 pub use evaluate::{Reason, Stopped};
 pub use limit::Bound;
 pub use map::{AxisAnswer, MapAnswer};
-pub use quantity::{Needs, QUANTITIES, Quantity, Source};
+pub use quantity::{AnswerPlace, Needs, QUANTITIES, Quantity, Source};
 pub use rank::{QuantileAnswer, ShareAnswer};
 pub use rows::{ImpossibleAnswer, PossibleAnswer, ReasonAnswer, RowsPart};
 pub use search::{FoundAnswer, FreeAnswer, IslandPart, LimitAnswer, RelaxationAnswer, ScanAnswer, SearchAnswer};

@@ -14,15 +14,19 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
-    /// An answer to the same document has it: path of the request, and JSON pointer into the answer.
-    Answer {
-        /// Path of the request.
-        path: &'static str,
-        /// JSON pointer into the answer.
-        pointer: &'static str,
-    },
+    /// An answer to the same document has it.
+    Answer(AnswerPlace),
     /// Definition of a quantity that is computed from an answer.
     Definition(&'static str),
+}
+
+/// Place of a value in an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+pub struct AnswerPlace {
+    /// Path of the request.
+    pub path: &'static str,
+    /// JSON pointer into the answer.
+    pub pointer: &'static str,
 }
 
 /// Fields of the document that a quantity needs.
@@ -214,15 +218,15 @@ const fn pressure_velocity(name: &'static str, meaning: &'static str, source: So
 }
 
 const fn geometry(pointer: &'static str) -> Source {
-    Source::Answer { path: "/v1/geometry", pointer }
+    Source::Answer(AnswerPlace { path: "/v1/geometry", pointer })
 }
 
 const fn mesh(pointer: &'static str) -> Source {
-    Source::Answer { path: "/v1/coincidence-degree", pointer }
+    Source::Answer(AnswerPlace { path: "/v1/coincidence-degree", pointer })
 }
 
 const fn sweep(pointer: &'static str) -> Source {
-    Source::Answer { path: "/v1/sweep", pointer }
+    Source::Answer(AnswerPlace { path: "/v1/sweep", pointer })
 }
 
 /// The two quantities from which a search can derive the free fields.

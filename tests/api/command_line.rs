@@ -286,3 +286,45 @@ fn escapes_control_characters_for_terminal() {
     assert!(said.trim_end().chars().all(|character| !character.is_control() || character == '\n'), "{said:?}");
     assert!(said.contains(r"\u{1b}[2J\u{9b}31m\u{7}good"), "{said:?}");
 }
+
+#[tokio::test]
+async fn csv_has_a_decimal_comma_on_request() {
+    for (command, path) in COMMANDS {
+        let document = std::fs::read(example("paper-5.2")).unwrap();
+        let ask = async |query: &str| {
+            let question = Question::post(&format!("{path}{query}"), document.clone()).with("accept", "text/csv");
+            Service::new().ask(&question).await
+        };
+        let (point, comma) = (ask("?decimal=point").await, ask("?decimal=comma").await);
+        assert_eq!(point.text(), ask("").await.text());
+        // No field holds a comma, a semicolon, or a point but in its number.
+        assert_eq!(comma.text(), point.text().replace(',', ";").replace('.', ","), "{path}");
+        assert_eq!(comma.header("content-type"), point.header("content-type"));
+        let arguments = [command, "--format", "csv-comma", &example("paper-5.2")];
+        assert_eq!(stdout(&run(&arguments, b"")), comma.text());
+        for query in ["?decimal=dot", "?decimal", "?comma=true"] {
+            ask(query).await.refused(400, "invalid_query");
+        }
+    }
+}
+
+#[test]
+fn draw_writes_meshes_for_printing() {
+    let stl = run(&["draw", "tooth", &example("paper-5.1"), "--format", "stl", "--printing"], b"").stdout;
+    let x_mm = stl[84..].chunks_exact(50).map(|record| f32::from_le_bytes(record[12..16].try_into().unwrap()));
+    assert!((x_mm.fold(0.0, f32::max) - 4.95).abs() < 1e-6);
+    let archive = run(&["draw", "assembly", &example("paper-5.1"), "--format", "3mf"], b"").stdout;
+    assert!(archive.starts_with(b"PK"));
+}
+
+#[tokio::test]
+async fn a_document_in_utf_16_is_named() {
+    let text = std::fs::read_to_string(example("paper-5.1")).unwrap();
+    let little: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let big: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
+    for document in [[b"\xFF\xFE", &little[..]].concat(), [b"\xFE\xFF", &big[..]].concat(), little, big] {
+        let problem = Service::new().post_text("/v1/sweep", document.clone()).await.refused(400, "malformed_json");
+        assert!(problem["detail"].as_str().unwrap().contains("the document is UTF-16; save it as UTF-8"), "{problem}");
+        assert!(stderr(&run(&["sweep", "-"], &document)).contains("UTF-16"));
+    }
+}

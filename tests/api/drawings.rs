@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use serde_json::{Value, json};
 
 use crate::asking::{Question, Service};
-use crate::designs::{bored, shortest, undercut, with};
+use crate::designs::{bored, eccentric, shortest, undercut, with};
 
-const PARTS: [&str; 4] = ["ring", "wave-generator", "carrier", "tooth"];
+pub(crate) const PARTS: [&str; 4] = ["ring", "wave-generator", "carrier", "tooth"];
 
 /// Returns case 5.1 with a `parts` group.
 pub(crate) fn made(parts: &str) -> Value {
@@ -53,7 +53,7 @@ pub(crate) const MISFITS: [(&str, &str, &str, f64, f64); 8] = [
     (r#"{ "teeth": { "clearance_um": 5000 } }"#, "clearance_takes_tooth", "/parts/teeth/clearance_um", 5000.0, 5000.0),
 ];
 
-async fn drawn(part: &str, document: &Value) -> Value {
+pub(crate) async fn drawn(part: &str, document: &Value) -> Value {
     Service::new().post(&format!("/v1/drawings/{part}"), document).await.found()
 }
 
@@ -78,8 +78,10 @@ fn area_mm2(outline: &Value) -> f64 {
         if edge["kind"] == "arc" {
             let (radius_mm, sweep_rad) =
                 (edge["radius_mm"].as_f64().unwrap(), edge["sweep_deg"].as_f64().unwrap().to_radians());
-            // About the origin, which is the arc's centre.
-            return 0.5 * radius_mm * radius_mm * sweep_rad;
+            let center = numbers(&edge["center_mm"]);
+            // The sector, and the triangle of its centre, its ends and the origin.
+            let moved = center[0] * (y[2] - y[0]) - center[1] * (x[2] - x[0]);
+            return 0.5 * (radius_mm * radius_mm * sweep_rad + moved);
         }
         (1..x.len()).map(|i| 0.5 * (x[i - 1] * y[i] - x[i] * y[i - 1])).sum()
     };
@@ -87,7 +89,7 @@ fn area_mm2(outline: &Value) -> f64 {
 }
 
 /// Returns the area of all prisms in a drawing of one part.
-async fn part_area_mm2(part: &str, document: &Value) -> f64 {
+pub(crate) async fn part_area_mm2(part: &str, document: &Value) -> f64 {
     let drawing = drawn(part, document).await;
     let [body] = drawing["bodies"].as_array().unwrap().as_slice() else { panic!("{drawing}") };
     let holes: f64 = body["holes"].as_array().unwrap().iter().map(area_mm2).sum();
@@ -224,6 +226,30 @@ async fn balls_are_spheres_and_other_parts_prisms() {
 }
 
 #[tokio::test]
+async fn eccentric_is_arcs_and_cylinders() {
+    let document =
+        with(&eccentric(), "/parts", json!({ "wave_generator": { "bore_radius_mm": 10.0, "clearance_um": 50.0 } }));
+    let drawing = drawn("wave-generator", &document).await;
+    let edges = drawing["bodies"][0]["outer"]["edges"].as_array().unwrap();
+    assert_eq!(edges.len(), 2);
+    for edge in edges {
+        let found = (&edge["kind"], &edge["center_mm"], &edge["radius_mm"], &edge["sweep_deg"]);
+        assert_eq!(found, (&json!("arc"), &json!([1.2, 0.0]), &json!(30.75), &json!(180.0)));
+    }
+    assert_area(part_area_mm2("wave-generator", &document).await, PI * (30.75 * 30.75 - 100.0), "eccentric");
+    let step = written("wave-generator", &document, "model/step").await;
+    let count = |what: &str| step.matches(what).count();
+    // Two halves each of the eccentric and of its bore; below and above each has a circle.
+    assert_eq!(
+        (count("=CYLINDRICAL_SURFACE("), count("=CIRCLE("), count("B_SPLINE"), count("EXTRUSION")),
+        (4, 8, 0, 0)
+    );
+    assert!(step.contains("CARTESIAN_POINT('',(1.2,0.,0.))"));
+    let svg = written("wave-generator", &document, "image/svg+xml").await;
+    assert_eq!((svg.matches("A30.75 30.75").count(), svg.matches('L').count()), (2, 0));
+}
+
+#[tokio::test]
 async fn draws_part_though_another_is_impossible() {
     let document = made(r#"{ "ring": { "outer_radius_mm": 10 } }"#);
     drawn("carrier", &document).await;
@@ -266,7 +292,7 @@ async fn each_edge_starts_where_previous_ends() {
 }
 
 /// Sets a chord tolerance far below the one of compared areas.
-fn finely(document: &Value) -> Value {
+pub(crate) fn finely(document: &Value) -> Value {
     with(document, "/profile", json!({ "chord_tolerance_mm": 1e-6 }))
 }
 

@@ -1,11 +1,13 @@
 //! AutoCAD's requirements for DXF. Each line of the list in docs/reference/dxf.md has a test.
 
 use std::collections::{HashMap, HashSet};
+use std::f64::consts::FRAC_PI_2;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::asking::{Question, Service};
-use crate::designs::{bored, shortest};
+use crate::designs::{bored, eccentric, shortest, undercut, with};
+use crate::profiles::{Point, geometry};
 
 /// A group code and its value.
 type Pair = (i32, String);
@@ -237,4 +239,87 @@ async fn initial_view_holds_whole_drawing() {
         assert_eq!((value(views[0], 12), value(views[0], 22)), ("0.0", "0.0"));
         assert!(value(views[0], 40).parse::<f64>().unwrap() > 2.0 * reach_mm);
     }
+}
+
+/// Start, end and bulge of each edge of a closed polyline.
+type Arc = (Point, Point, f64);
+
+fn arcs(pairs: &[Pair]) -> Vec<Arc> {
+    let entities = objects(section(pairs, "ENTITIES"));
+    let polyline = entities.into_iter().find(|entity| entity[0].1 == "LWPOLYLINE").unwrap();
+    let number = |pair: &Pair| pair.1.parse::<f64>().unwrap();
+    let mut corners: Vec<(Point, f64)> = Vec::new();
+    for two in polyline.windows(2) {
+        match (two[0].0, two[1].0) {
+            (10, 20) => corners.push(((number(&two[0]), number(&two[1])), 0.0)),
+            (_, 42) => corners.last_mut().unwrap().1 = number(&two[1]),
+            _ => {}
+        }
+    }
+    let next = corners.iter().cycle().skip(1);
+    corners.iter().zip(next).map(|(&(start, bulge), &(end, _))| (start, end, bulge)).collect()
+}
+
+/// How far a point is from an arc, or from a line, whose bulge is 0.
+fn distance(&((ax, ay), (bx, by), bulge): &Arc, (x, y): Point) -> f64 {
+    let (dx, dy) = (bx - ax, by - ay);
+    let chord = dx.hypot(dy);
+    let from_ends = (x - ax).hypot(y - ay).min((x - bx).hypot(y - by));
+    // Along the chord and to its left, from its middle.
+    let (along, left) = (
+        ((x - 0.5 * (ax + bx)) * dx + (y - 0.5 * (ay + by)) * dy) / chord,
+        ((y - 0.5 * (ay + by)) * dx - (x - 0.5 * (ax + bx)) * dy) / chord,
+    );
+    if bulge == 0.0 {
+        return if along.abs() <= 0.5 * chord { left.abs() } else { from_ends };
+    }
+    // A counter-clockwise arc runs on the right of its chord, by its bulge times half the chord; its centre is on the left.
+    let (sagitta, radius) = (0.5 * chord * bulge.abs(), 0.25 * chord * (1.0 + bulge * bulge) / bulge.abs());
+    let up = -left * bulge.signum() + radius - sagitta;
+    let is_beside = up > 0.0 && along.abs() * (radius - sagitta) <= 0.5 * chord * up;
+    if is_beside { (along.hypot(up) - radius).abs() } else { from_ends }
+}
+
+fn farthest(arcs: &[Arc], points: impl IntoIterator<Item = Point>) -> f64 {
+    let nearest = |point| arcs.iter().map(|arc| distance(arc, point)).fold(f64::INFINITY, f64::min);
+    points.into_iter().map(nearest).fold(0.0, f64::max)
+}
+
+#[tokio::test]
+async fn arcs_are_true_to_flank_and_cam() {
+    for design in [shortest(), undercut(), bored()] {
+        for tolerance_mm in [1e-2, 1e-3, 1e-5] {
+            let document = with(&design, "/profile", json!({ "chord_tolerance_mm": tolerance_mm, "extent": "tooth" }));
+            let number = |pointer: &str| document.pointer(pointer).unwrap().as_f64().unwrap();
+            let ring = arcs(&pairs("ring", &document).await);
+            let of_space = ring.len() / document["drive"]["ring"]["teeth"].as_u64().unwrap() as usize;
+            let flank = geometry(&document).await.flank(4000);
+            let off_mm = farthest(&ring[..of_space], flank);
+            assert!(off_mm <= tolerance_mm, "flank: {off_mm} mm, tolerance {tolerance_mm} mm");
+
+            let (a, b) = (number("/drive/wave_generator/semi_major_mm"), number("/drive/wave_generator/semi_minor_mm"));
+            let cam = arcs(&pairs("wave-generator", &document).await);
+            let ellipse = (0..4000).map(|i| FRAC_PI_2 * f64::from(i) / 1000.0).map(|t| (a * t.cos(), b * t.sin()));
+            let off_mm = farthest(&cam, ellipse);
+            assert!(off_mm <= tolerance_mm, "cam: {off_mm} mm, tolerance {tolerance_mm} mm");
+        }
+    }
+}
+
+#[tokio::test]
+async fn case_5_1_has_few_arcs() {
+    let count = async |part: &str| arcs(&pairs(part, &shortest()).await).len();
+    let (cam, ring) = (count("wave-generator").await, count("ring").await);
+    assert!(cam <= 48 && ring <= 26 * 24, "{cam} and {ring} arcs");
+}
+
+#[tokio::test]
+async fn an_eccentric_is_a_circle_entity() {
+    let document = with(&eccentric(), "/parts", json!({ "wave_generator": { "bore_radius_mm": 10.0 } }));
+    let pairs = pairs("wave-generator", &document).await;
+    let circles: Vec<_> = objects(section(&pairs, "ENTITIES"))
+        .into_iter()
+        .map(|entity| (entity[0].1.as_str(), [10, 20, 40].map(|code| value(entity, code).parse::<f64>().unwrap())))
+        .collect();
+    assert_eq!(circles, [("CIRCLE", [1.2, 0.0, 30.8]), ("CIRCLE", [0.0, 0.0, 10.0])]);
 }

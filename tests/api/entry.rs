@@ -11,7 +11,7 @@ use crate::designs::shortest;
 use crate::serving::Process;
 
 /// Makes a key and its line of a keys file with the command line.
-fn new_key(name: &str) -> (String, String) {
+pub(crate) fn new_key(name: &str) -> (String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_toothwave")).args(["new-key", name]).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     let mut values = text.lines().map(|line| line.split_once(':').unwrap().1.trim().to_owned());
@@ -19,10 +19,10 @@ fn new_key(name: &str) -> (String, String) {
 }
 
 /// A temporary keys file.
-struct KeysFile(PathBuf);
+pub(crate) struct KeysFile(PathBuf);
 
 impl KeysFile {
-    fn of(text: &str) -> Self {
+    pub(crate) fn of(text: &str) -> Self {
         static FILES: AtomicUsize = AtomicUsize::new(0);
         let name = format!("keys-{}-{}", std::process::id(), FILES.fetch_add(1, Ordering::Relaxed));
         let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -30,7 +30,7 @@ impl KeysFile {
         Self(path)
     }
 
-    fn path(&self) -> &str {
+    pub(crate) fn path(&self) -> &str {
         self.0.to_str().unwrap()
     }
 }

@@ -113,14 +113,14 @@ async fn documentation_page_loads_from_this_service_only() {
         compact.contains("\"validatorUrl\":\"none\"") || compact.contains("\"validatorUrl\":null"),
         "{initializer}"
     );
-    assert!(compact.contains("\"url\":\"/openapi.json\""), "{initializer}");
+    assert!(compact.contains("\"url\":\"openapi.json\""), "{initializer}");
 }
 
 #[tokio::test]
 async fn documentation_path_works_without_slash() {
     let answer = Service::new().get("/docs").await;
     assert!((300..400).contains(&answer.status), "{}", answer.status);
-    assert_eq!(answer.header("location"), "/docs/");
+    assert_eq!(answer.header("location"), "docs/");
 }
 
 #[tokio::test]

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::asking::Service;
 use crate::designs::{bored, shortest, undercut, with};
 
-type Point = (f64, f64);
+pub(crate) type Point = (f64, f64);
 
 /// Parameters of a drive.
 #[derive(Clone, Copy)]
@@ -107,7 +107,7 @@ fn distance_from(polyline: &[Point], p: Point) -> f64 {
     polyline.windows(2).map(from_chord).fold(f64::INFINITY, f64::min)
 }
 
-struct Geometry {
+pub(crate) struct Geometry {
     numbers: Numbers,
     answer: Value,
     ring: Vec<Point>,
@@ -115,7 +115,7 @@ struct Geometry {
     cam: Vec<Point>,
 }
 
-async fn geometry(document: &Value) -> Geometry {
+pub(crate) async fn geometry(document: &Value) -> Geometry {
     let answer = Service::new().post("/v1/geometry", document).await.found();
     Geometry {
         numbers: Numbers::of(document),
@@ -136,7 +136,7 @@ impl Geometry {
     }
 
     /// Samples the ring's flank at positive angles, from the root.
-    fn flank(&self, count: u32) -> Vec<Point> {
+    pub(crate) fn flank(&self, count: u32) -> Vec<Point> {
         let end = self.numbers.normal_angle(self.start_deg());
         (0..=count).map(|i| self.numbers.tooth(end * f64::from(i) / f64::from(count)).2).collect()
     }

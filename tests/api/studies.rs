@@ -81,7 +81,7 @@ async fn study_without_wait_has_status_and_events() {
     let answer = start_study(&service, &map(&shortest(), 5)).await;
     assert_eq!(answer.status, 202, "{}", answer.text());
     let study = answer.json();
-    assert_eq!(answer.header("location"), place(&study));
+    assert_eq!(format!("/v1/{}", answer.header("location")), place(&study));
     let events = service.get(study["events_href"].as_str().unwrap()).await;
     assert_eq!((events.status, events.header("content-type")), (200, "text/event-stream"));
     let last = events.text().trim_end().rsplit("\n\n").next().unwrap();

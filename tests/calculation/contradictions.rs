@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 use toothwave_calculation::convert::converted;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::drawing::preset::Preset;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::question::{Limits, Question};
@@ -133,7 +134,9 @@ fn deprecated_clearance_means_the_same_in_parts() {
     assert!(found.contains(&("deprecated_field".into(), json!(["/model/clearance"]))), "{found:?}");
     assert!(!codes(&swept(&new).unwrap()).iter().any(|(code, _)| code == "deprecated_field"));
     let drawn = |changes: &Value| {
-        let answer = Drawing(DrawnPart::Ring).ask(with(changes).to_string().as_bytes(), &LIMITS, &Never).unwrap();
+        let answer = Drawing { part: DrawnPart::Ring, preset: Preset::Document }
+            .ask(with(changes).to_string().as_bytes(), &LIMITS, &Never)
+            .unwrap();
         serde_json::to_value(answer).unwrap()
     };
     assert_eq!(drawn(&old)["bodies"], drawn(&new)["bodies"]);

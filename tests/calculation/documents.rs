@@ -9,6 +9,7 @@ use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::drawing::preset::Preset;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::forms::Format;
 use toothwave_calculation::geometry::Geometry;
@@ -95,7 +96,7 @@ pub(crate) fn keys(design: &Design) -> Vec<Key> {
         Sweep.key(design, &form),
         Accuracy.key(design, &form),
     ];
-    keys.extend(DrawnPart::ALL.map(|part| Drawing(part).key(design, &form)));
+    keys.extend(DrawnPart::ALL.map(|part| Drawing { part, preset: Preset::Document }.key(design, &form)));
     keys
 }
 

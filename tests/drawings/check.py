@@ -21,16 +21,27 @@ CHORDS = 20_000
 # The service's chords are true to this, over some hundred millimetres.
 CHORD_TOLERANCE_MM = 1e-4
 RELATIVE_ERROR = 1e-5
-# What is cut out of a part: the tooth spaces of the ring, the bore of the wave generator.
-HOLES = {("ring", "LWPOLYLINE"), ("wave-generator", "CIRCLE")}
+
+
+def is_eccentric(design):
+    return design["drive"]["wave_generator"].get("kind") == "eccentric"
+
+
+def lobes(design):
+    return 1 if is_eccentric(design) else 2
 
 
 def contact(design, normal, clearance_mm):
     """Polar radius and angle of the flank where a tooth touches it, from the cam's normal angle."""
     cam, r = design["drive"]["wave_generator"], design["drive"]["teeth"]["radius_mm"]
-    a, b, k = cam["semi_major_mm"], cam["semi_minor_mm"], design["drive"]["ring"]["teeth"] / 2
-    h = hypot(a * cos(normal), b * sin(normal))
-    dh = -(a * a - b * b) * sin(normal) * cos(normal) / h
+    k = design["drive"]["ring"]["teeth"] / lobes(design)
+    if is_eccentric(design):
+        e = cam["eccentricity_mm"]
+        h, dh = cam["radius_mm"] + e * cos(normal), -e * sin(normal)
+    else:
+        a, b = cam["semi_major_mm"], cam["semi_minor_mm"]
+        h = hypot(a * cos(normal), b * sin(normal))
+        dh = -(a * a - b * b) * sin(normal) * cos(normal) / h
     d, psi = hypot(h + r, dh), normal + atan(dh / (h + r))
     beta = atan(-k * dh / (h + r))
     distance = r + clearance_mm
@@ -50,9 +61,10 @@ def tooth_spaces_mm2(design, clearance_mm):
     ring = design["drive"]["ring"]
     pitch = pi / ring["teeth"]
     overshoot = lambda normal: contact(design, normal, clearance_mm)[1] - pitch
-    scan = [pi / 2 * i / 2000 for i in range(1, 2000)]
+    valley = pi / lobes(design)
+    scan = [valley * i / 2000 for i in range(1, 2000)]
     beyond = next((normal for normal in scan if overshoot(normal) > 0), None)
-    end = pi / 2 if beyond is None else bisected(overshoot, beyond - pi / 4000, beyond)
+    end = valley if beyond is None else bisected(overshoot, beyond - valley / 2000, beyond)
     bore = ring.get("tip_radius_mm")
     if bore and contact(design, end, clearance_mm)[0] < bore:
         end = bisected(lambda normal: bore - contact(design, normal, clearance_mm)[0], 0, end)
@@ -64,12 +76,14 @@ def tooth_spaces_mm2(design, clearance_mm):
 
 def expected_mm2(part, design):
     drive, parts = design["drive"], design["parts"]
-    a, b = drive["wave_generator"]["semi_major_mm"], drive["wave_generator"]["semi_minor_mm"]
-    r = drive["teeth"]["radius_mm"]
+    cam, r = drive["wave_generator"], drive["teeth"]["radius_mm"]
     clearance_mm = {name: 1e-3 * group.get("clearance_um", 0) for name, group in parts.items()}
     if part == "tooth":
         return pi * (r - clearance_mm["teeth"]) ** 2
+    if part == "wave-generator" and is_eccentric(design):
+        return pi * ((cam["radius_mm"] - clearance_mm["wave_generator"]) ** 2 - parts["wave_generator"]["bore_radius_mm"] ** 2)
     if part == "wave-generator":
+        a, b = cam["semi_major_mm"], cam["semi_minor_mm"]
         # Steiner: the inner parallel curve of a curve of length L bounds L c - pi c² less.
         steps = 10_000
         normals = [2 * pi * (i + 0.5) / steps for i in range(steps)]
@@ -80,7 +94,7 @@ def expected_mm2(part, design):
         inner, outer = (parts["carrier"][f"{edge}_radius_mm"] for edge in ("inner", "outer"))
         w = r + clearance_mm["carrier"]
         slot = lambda radius: w * sqrt(radius**2 - w**2) + radius**2 * math.asin(w / radius)
-        return pi * (outer**2 - inner**2) - drive["teeth"]["installed"] * (slot(outer) - slot(inner))
+        return pi * (outer**2 - inner**2) - drive["teeth"].get("installed", drive["teeth"]["count"]) * (slot(outer) - slot(inner))
     return pi * parts["ring"]["outer_radius_mm"] ** 2 - tooth_spaces_mm2(design, clearance_mm["ring"])
 
 
@@ -112,7 +126,7 @@ def check(url, name, part, design):
     faults = auditor.errors + auditor.fixes
     assert not faults, [fault.message for fault in faults]
     assert document.header["$INSUNITS"] == 4, "millimetres"
-    found = 0.0
+    sizes = []
     for entity in document.modelspace():
         hash_of_design = entity.get_xdata("TOOTHWAVE")[0].value
         assert "design" in hash_of_design, hash_of_design
@@ -121,7 +135,13 @@ def check(url, name, part, design):
         else:
             assert entity.dxftype() == "LWPOLYLINE" and entity.closed, entity
             size = abs(polyline_mm2(entity))
-        found += -size if (part, entity.dxftype()) in HOLES else size
+        sizes.append(size)
+    # Fingers have no holes; of the other parts what bounds them comes first.
+    found = sum(sizes) if part == "carrier" else sizes[0] - sum(sizes[1:])
+    circles = [entity for entity in document.modelspace() if entity.dxftype() == "CIRCLE"]
+    # The rim; an eccentric and its bore, or the bore; no finger; a tooth.
+    wanted = {"ring": 1, "wave-generator": 1 + is_eccentric(design), "carrier": 0, "tooth": 1}[part]
+    assert len(circles) == wanted, f"{name} {part}: {len(circles)} circles"
     expected = expected_mm2(part, design)
     error = abs(found / expected - 1)
     assert error < RELATIVE_ERROR, f"{name} {part}: {found} mm², expected {expected}"
@@ -130,18 +150,22 @@ def check(url, name, part, design):
 
 def main():
     url = sys.argv[1].rstrip("/")
-    for name in ("paper-5.1", "paper-5.2", "paper-5.2-bored"):
+    for name in ("paper-5.1", "paper-5.2", "paper-5.2-bored", "eccentric-roller"):
         with urllib.request.urlopen(f"{url}/v1/examples/{name}", timeout=60) as response:
             design = json.load(response)
         cam = design["drive"]["wave_generator"]
         r = design["drive"]["teeth"]["radius_mm"]
         design["profile"] = {"chord_tolerance_mm": CHORD_TOLERANCE_MM}
-        tip_mm = cam["semi_minor_mm"] + 2 * r
+        if is_eccentric(design):
+            lobe_mm, valley_mm = (cam["radius_mm"] + sign * cam["eccentricity_mm"] for sign in (1, -1))
+        else:
+            lobe_mm, valley_mm = cam["semi_major_mm"], cam["semi_minor_mm"]
+        tip_mm = valley_mm + 2 * r
         parts = {
-            "wave_generator": {"bore_radius_mm": 20.0},
+            "wave_generator": {"bore_radius_mm": valley_mm / 2},
             "teeth": {},
-            "ring": {"outer_radius_mm": 1.25 * (cam["semi_major_mm"] + 2 * r)},
-            "carrier": {"inner_radius_mm": cam["semi_major_mm"] + 0.1, "outer_radius_mm": tip_mm - 0.1},
+            "ring": {"outer_radius_mm": 1.25 * (lobe_mm + 2 * r)},
+            "carrier": {"inner_radius_mm": lobe_mm + 0.1, "outer_radius_mm": tip_mm - 0.1},
         }
         for clearance_um in (0.0, 8.0):
             made = {group: {**fields, "clearance_um": clearance_um} for group, fields in parts.items()}

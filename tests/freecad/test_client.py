@@ -11,6 +11,7 @@ import unittest
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from unittest import mock
 
+import FreeCAD
 import toothwave_client
 import toothwave_design
 from cases import complete, designs, example
@@ -32,6 +33,22 @@ class Imports(unittest.TestCase):
                 names += [node.module] if isinstance(node, ast.ImportFrom) else []
                 for name in names:
                     self.assertIn(name.split(".")[0], allowed, path.name)
+
+    def test_every_file_is_python_3_8(self):
+        """Neither its grammar nor what `str` and `dict` learnt in 3.9; `|` joins Qt's flags alone."""
+        for path in [*CLIENT.glob("*.py"), *(ROOT / "clients/python").glob("*.py")]:
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), feature_version=(3, 8))):
+                self.assertNotIn(getattr(node, "attr", ""), ("removeprefix", "removesuffix"), path.name)
+                if isinstance(node, (ast.BinOp, ast.AugAssign)) and isinstance(node.op, ast.BitOr):
+                    self.assertIn("QtGui", ast.unparse(node), path.name)
+
+    def test_the_addon_manager_finds_the_workbench(self):
+        metadata = FreeCAD.Metadata(str(ROOT / "package.xml"))
+        (workbench,) = metadata.Content["workbench"]
+        self.assertTrue(metadata.supportsCurrentFreeCAD())
+        self.assertIn(f'version = "{metadata.Version}"', (ROOT / "Cargo.toml").read_text(encoding="utf-8"))
+        self.assertIn(f"class {workbench.Classname}", (ROOT / workbench.Subdirectory / "InitGui.py").read_text(encoding="utf-8"))
+        self.assertTrue((ROOT / workbench.Subdirectory / workbench.Icon).is_file())
 
     def test_no_file_depends_on_another_in_a_circle(self):
         """Imports within functions count too."""
@@ -367,6 +384,13 @@ class NoPause:
 
 
 class Addresses(NoPause, unittest.TestCase):
+    def test_this_machine_needs_no_proxy_and_another_one_does(self):
+        with host(DRAWING) as (address, heard), mock.patch.dict(os.environ, http_proxy=f"http://{address}", no_proxy=""):
+            for name, port in (("127.0.0.1", address.split(":")[1]), ("drives.example", "8080")):
+                toothwave_client.Service(f"{name}:{port}").drawing("ring", {})
+        self.assertTrue(heard[0].startswith("POST /v1/"), heard[0])
+        self.assertTrue(heard[1].startswith("POST http://drives.example:8080/v1/"), heard[1])
+
     def test_what_can_be_no_address_is_no_service_and_says_why(self):
         for text, why in {
             "": "the address is empty",

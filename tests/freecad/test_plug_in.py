@@ -15,8 +15,15 @@ from service import DIES_WITHIN, ROOT, answer, host, running_service
 PROGRAM = ROOT / "clients/python/plug_in.py"
 
 
-def run(url, design):
-    return subprocess.run([sys.executable, PROGRAM, url, design], capture_output=True, text=True, encoding="utf-8", check=False)
+def run(url, design, **environment):
+    return subprocess.run(
+        [sys.executable, PROGRAM, url, design],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        check=False,
+        env={**os.environ, **environment},
+    )
 
 
 class PlugIn(unittest.TestCase):
@@ -34,6 +41,11 @@ class PlugIn(unittest.TestCase):
         self.assertEqual(lines[:4], lines[8:12])
         self.assertIn("teeth           40 of circle, 15.0 mm wide, the first at (52.2000, 0.0000) mm", lines[2])
         self.assertEqual(lines[-1], "2 drawings were sent")
+
+    def test_no_proxy_stands_before_this_machine(self):
+        with running_service() as url:
+            done = run(url, ROOT / "examples/paper-5.2.json", http_proxy="http://127.0.0.1:1")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
 
     def test_it_says_what_the_service_objects_to(self):
         with running_service() as url, tempfile.TemporaryDirectory() as folder:
@@ -76,11 +88,11 @@ class NoAnswer(unittest.TestCase):
         program = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(program)
         for reason, attempts in ((BrokenPipeError(), 4), (ConnectionAbortedError(), 4), (ConnectionRefusedError(), 1)):
-            lost = mock.patch.object(program.urllib.request, "urlopen", side_effect=urllib.error.URLError(reason))
-            with self.subTest(reason), lost as urlopen, mock.patch.object(program.time, "sleep"):
+            lost = mock.patch.object(program.urllib.request.OpenerDirector, "open", side_effect=urllib.error.URLError(reason))
+            with self.subTest(reason), lost as opened, mock.patch.object(program.time, "sleep"):
                 with self.assertRaises(SystemExit):
                     program.drawing("127.0.0.1:1", {})
-                self.assertEqual(urlopen.call_count, attempts)
+                self.assertEqual(opened.call_count, attempts)
 
     def test_a_host_that_is_no_service_or_dies(self):
         for said in (

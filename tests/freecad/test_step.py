@@ -68,6 +68,15 @@ class Step(unittest.TestCase):
             self.assertLess(ball.CenterOfMass.distanceToPoint(FreeCAD.Vector(0, 0, theory.width_mm / 2)), 1e-9)
             self.assertEqual({face.Surface.TypeId for face in ball.Faces}, {"Part::GeomSphere"})
 
+    def test_an_eccentric_and_its_bore_are_cylinders(self):
+        for clearance_um in (0.0, 50.0):
+            part = {"bore_radius_mm": 10.0, "clearance_um": clearance_um}
+            (cam,) = read("wave_generator", example("eccentric-roller") | {"parts": {"wave_generator": part}})
+            curved = [face.Surface for face in cam.Faces if face.Surface.TypeId != "Part::GeomPlane"]
+            self.assertEqual({surface.TypeId for surface in curved}, {"Part::GeomCylinder"})
+            found = sorted({(round(surface.Radius, 9), round(surface.Center.x, 9)) for surface in curved})
+            self.assertEqual(found, [(10.0, 0.0), (30.8 - clearance_um / 1000, 1.2)])
+
     def test_the_thinnest_walls_that_are_drawn_are_valid_solids(self):
         parts = {"wave_generator": {"bore_radius_mm": 56 - 6e-5}, "ring": {"outer_radius_mm": 68 + 7e-5}}
         for part in parts:

@@ -11,6 +11,7 @@ use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::drawing::preset::Preset;
 use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
@@ -61,7 +62,7 @@ fn assert_text_is_answered(text: &[u8]) {
             assert_answered(Geometry, &design);
             assert_answered(CoincidenceDegree, &design);
             assert_answered(Sweep, &design);
-            assert_answered(Drawing(DrawnPart::Assembly), &design);
+            assert_answered(Drawing { part: DrawnPart::Assembly, preset: Preset::Document }, &design);
         }
         Err(reason) => assert_refused_for_a_reason(&reason),
     }

@@ -261,9 +261,9 @@ fn drawn_distances_equal_model_gaps() {
         for m in modifications {
             let bodies = drawn(&p, Subject::Assembly, &parts(m), 1e-5, 7.0);
             let [ring, carrier, teeth, cam] = &bodies[..] else { panic!("{bodies:?}") };
-            let ring_points = placed(edges(&ring.section.holes[0]), 0.0);
-            let cam_points = placed(edges(&cam.section.outer), cam.placements[0].rotation_rad);
-            let Outline::Circle { radius_mm } = teeth.section.outer else { panic!("a tooth is round") };
+            let ring_points = placed_outline(&ring.section.holes[0], 0.0);
+            let cam_points = placed_outline(&cam.section.outer, cam.placements[0].rotation_rad);
+            let Outline::Circle { radius_mm, .. } = teeth.section.outer else { panic!("a tooth is round") };
             let fingers = carrier.placements.len();
             let mut looked_at = 0;
             for (slot, tooth) in teeth.placements.iter().enumerate() {
@@ -280,7 +280,7 @@ fn drawn_distances_equal_model_gaps() {
                 let gap = gaps.at(&Place::default(), &at, &drive.flank().at(&at));
                 // The wall under load is ahead of the tooth if the carrier turns forward, else behind it.
                 let finger = if sense > 0.0 { slot } else { (slot + fingers - 1) % fingers };
-                let walls = placed(edges(&carrier.section.outer), carrier.placements[finger].rotation_rad);
+                let walls = placed_outline(&carrier.section.outer, carrier.placements[finger].rotation_rad);
                 for (name, outline, gap_mm) in [
                     ("ring", &ring_points, gap.ring),
                     ("cam", &cam_points, gap.wave_generator),
@@ -291,6 +291,17 @@ fn drawn_distances_equal_model_gaps() {
                 }
             }
             assert!(looked_at >= 5, "{looked_at}");
+        }
+    }
+}
+
+fn placed_outline(outline: &Outline, rotation_rad: f64) -> Vec<Point2<f64>> {
+    match outline {
+        Outline::Edges(edges) => placed(edges, rotation_rad),
+        // Chords within 2 nm of a radius of 31 mm.
+        Outline::Circle { center, radius_mm } => {
+            let at = |i: i32| Rotation2::new(PI * f64::from(i) / 5_000.0) * Vector2::new(*radius_mm, 0.0);
+            (0..10_000).map(|i| Rotation2::new(rotation_rad) * (center + at(i))).collect()
         }
     }
 }
@@ -458,7 +469,7 @@ fn drawing_keeps_expected_point_count() {
     for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
         for (subject, has_curves) in [
             (Subject::Part(Part::Ring), true),
-            (Subject::Part(Part::WaveGenerator), true),
+            (Subject::Part(Part::WaveGenerator), !p.wave_generator.is_eccentric_circle()),
             (Subject::Assembly, true),
             (Subject::Part(Part::Carrier), false),
             (Subject::Part(Part::Teeth), false),
@@ -564,7 +575,7 @@ proptest! {
         let reach_mm = reported_reach_mm(&p, &parts);
         prop_assert!(reach_mm >= drawn_mm * (1.0 - 1e-11), "{reach_mm} told, {drawn_mm} drawn");
         prop_assert!(reach_mm <= drawn_mm + 2.0 * tolerance_mm, "{reach_mm} told, {drawn_mm} drawn");
-        let Outline::Circle { radius_mm } = section.outer else { panic!("{:?}", section.outer) };
+        let Outline::Circle { radius_mm, .. } = section.outer else { panic!("{:?}", section.outer) };
         prop_assert!((radius_mm - RIM * reach_mm).abs() < 1e-12 * radius_mm);
         let thin = PartsParameters { ring_outer_radius_mm: Some(reach_mm * (1.0 + 1e-3)), ..parts };
         let found = Drawing::new(&draft, Subject::Part(Part::Ring), &thin, &parameters).unwrap().findings().unwrap();
@@ -772,7 +783,8 @@ fn polynomials_join_tangentially_and_end_with_curve() {
             for part in [Part::Ring, Part::WaveGenerator] {
                 let body = drawn(&p, Subject::Part(part), &parts(m), 1e-3, 0.0).remove(0);
                 let outline = body.section.holes.first().unwrap_or(&body.section.outer);
-                for edge in edges(outline) {
+                let Outline::Edges(edges) = outline else { continue };
+                for edge in edges {
                     let Edge::Curve { polynomials: polygons, .. } = edge else { continue };
                     let ends = (polygons[0][0], *polygons.last().unwrap().last().unwrap());
                     assert_eq!(ends, (edge.start(), edge.end()));
@@ -785,5 +797,70 @@ fn polynomials_join_tangentially_and_end_with_curve() {
                 }
             }
         }
+    }
+}
+
+/// Points of the arcs of all curves.
+fn along_arcs(edges: &[Edge]) -> Vec<Vector2<f64>> {
+    let mut sampled = Vec::new();
+    for edge in edges {
+        let Edge::Curve { arcs, .. } = edge else { continue };
+        assert_eq!(arcs[0].point, edge.start());
+        let ends = arcs.iter().skip(1).map(|arc| arc.point).chain([edge.end()]);
+        for (arc, end) in arcs.iter().zip(ends) {
+            let chord = end - arc.point;
+            let to_right = Vector2::new(chord.y, -chord.x);
+            // By the angle at which a point sees the chord's ends, half of the arc's on the other side.
+            let half_rad = 2.0 * arc.bulge.atan();
+            sampled.extend((0..=40).map(|i| {
+                let share = f64::from(i) / 40.0;
+                if arc.bulge == 0.0 {
+                    return arc.point.coords + share * chord;
+                }
+                let radius_mm = 0.5 * chord.norm() / half_rad.sin();
+                let center = arc.point + 0.5 * chord - to_right * (0.5 / half_rad.tan());
+                let start = arc.point - center;
+                assert!((start.norm() - radius_mm.abs()).abs() < 1e-9 * radius_mm.abs());
+                (center + Rotation2::new(2.0 * half_rad * share) * start).coords
+            }));
+        }
+    }
+    sampled
+}
+
+#[test]
+fn arcs_stay_within_chord_tolerance() {
+    for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
+        for tolerance_mm in [0.1, 1e-2, 1e-3, 1e-5] {
+            let ring = drawn(&p, Subject::Part(Part::Ring), &parts(NONE), tolerance_mm, 0.0).remove(0);
+            let edges = edges(&ring.section.holes[0]);
+            let of_space = edges.len() / usize::try_from(p.ring_teeth).unwrap();
+            for point in along_arcs(&edges[..of_space]) {
+                let above = Vector2::new(point.x, point.y.abs());
+                let off_mm = (from_path(&p, above, 0.0).0 - p.tooth_radius_mm).abs();
+                assert!(off_mm < tolerance_mm, "{off_mm} of {tolerance_mm} on {p:?}");
+            }
+            if let WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } = p.wave_generator {
+                let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts(NONE), tolerance_mm, 0.0).remove(0);
+                for point in along_arcs(self::edges(&cam.section.outer)) {
+                    let slope = 2.0 * (point.x / (a * a)).hypot(point.y / (b * b));
+                    let off_mm = ((point.x / a).powi(2) + (point.y / b).powi(2) - 1.0).abs() / slope;
+                    assert!(off_mm < tolerance_mm, "{off_mm} of {tolerance_mm}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn an_eccentric_is_a_circle_about_its_own_centre() {
+    let WaveGenerator::Eccentric { radius_mm: r, eccentricity_mm: e } = eccentric().wave_generator else { panic!() };
+    for (clearance_um, one_lobe) in [(0.0, false), (30.0, false), (30.0, true)] {
+        let as_harmonic = WaveGenerator::Harmonic { lobes: 1, mean_radius_mm: r, amplitude_mm: e };
+        let p = if one_lobe { DriveParameters { wave_generator: as_harmonic, ..eccentric() } } else { eccentric() };
+        let parts = PartsParameters { wave_generator_clearance_um: clearance_um, ..PartsParameters::default() };
+        let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts, 1e-3, 0.0).remove(0);
+        let expected = Outline::Circle { center: Point2::new(e, 0.0), radius_mm: r - 1e-3 * clearance_um };
+        assert_eq!(cam.section.outer, expected);
     }
 }

@@ -105,7 +105,7 @@ fn wave_generator_curves_join_and_end_radially() {
     for wave_generator in [
         PAPER_5_1.wave_generator,
         WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 63.0, amplitude_mm: 1.0 },
-        WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 },
+        WaveGenerator::HarmonicPath { lobes: 1, mean_path_radius_mm: 63.0, amplitude_mm: 1.0 },
     ] {
         let ring_teeth = 28 - wave_generator.lobes();
         let p = DriveParameters { wave_generator, ring_teeth, ..PAPER_5_1 };

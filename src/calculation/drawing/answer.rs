@@ -140,12 +140,14 @@ pub enum EdgeAnswer {
         /// y of its ends.
         y_mm: [f64; 2],
     },
-    /// An arc of a circle around the origin.
+    /// An arc of a circle.
     Arc {
         /// x of its start, its middle and its end.
         x_mm: [f64; 3],
         /// y of its start, its middle and its end.
         y_mm: [f64; 3],
+        /// x and y of the circle's centre.
+        center_mm: [f64; 2],
         /// Radius of the circle.
         radius_mm: f64,
         /// Angle of the arc, counter-clockwise positive.
@@ -164,6 +166,9 @@ pub enum EdgeAnswer {
         /// Bézier's polygons of the polynomials that solids have in its place.
         #[serde(skip)]
         polynomials: Vec<Vec<[f64; 2]>>,
+        /// x and y of the start, and the bulge, of the arcs that workshops have in its place.
+        #[serde(skip)]
+        arcs: Vec<[f64; 3]>,
     },
 }
 
@@ -188,11 +193,12 @@ impl From<Edge> for EdgeAnswer {
                 Self::Arc {
                     x_mm: [start.x, radius_mm * cos, end.x],
                     y_mm: [start.y, radius_mm * sin, end.y],
+                    center_mm: [0.0; 2],
                     radius_mm,
                     sweep_deg: sweep_rad.to_degrees(),
                 }
             }
-            Edge::Curve { points, start_tangent, end_tangent, polynomials } => Self::Curve {
+            Edge::Curve { points, start_tangent, end_tangent, polynomials, arcs } => Self::Curve {
                 x_mm: points.iter().map(|point| point.x).collect(),
                 y_mm: points.iter().map(|point| point.y).collect(),
                 start_tangent_deg: start_tangent.y.atan2(start_tangent.x).to_degrees(),
@@ -201,7 +207,25 @@ impl From<Edge> for EdgeAnswer {
                     .iter()
                     .map(|polygon| polygon.iter().map(|pole| [pole.x, pole.y]).collect())
                     .collect(),
+                arcs: arcs.iter().map(|arc| [arc.point.x, arc.point.y, arc.bulge]).collect(),
             },
+        }
+    }
+}
+
+impl OutlineAnswer {
+    /// Centre and radius, where it is a circle: around the origin, or as a path of arcs about one centre.
+    pub(super) fn circle(&self) -> Option<([f64; 2], f64)> {
+        match self {
+            Self::Circle { radius_mm } => Some(([0.0; 2], *radius_mm)),
+            Self::Path { edges } => {
+                let mut circles = edges.iter().map(|edge| match edge {
+                    EdgeAnswer::Arc { center_mm, radius_mm, .. } => Some((*center_mm, *radius_mm)),
+                    EdgeAnswer::Line { .. } | EdgeAnswer::Curve { .. } => None,
+                });
+                let first = circles.next()??;
+                circles.all(|circle| circle == Some(first)).then_some(first)
+            }
         }
     }
 }
@@ -238,7 +262,18 @@ impl PlacementAnswer {
 impl From<Outline> for OutlineAnswer {
     fn from(outline: Outline) -> Self {
         match outline {
-            Outline::Circle { radius_mm } => Self::Circle { radius_mm },
+            Outline::Circle { center, radius_mm } if center.coords.norm() > 0.0 => {
+                // From its rightmost point through the uppermost one, and back.
+                let half = |sign: f64| EdgeAnswer::Arc {
+                    x_mm: [center.x + sign * radius_mm, center.x, center.x - sign * radius_mm],
+                    y_mm: [center.y, center.y + sign * radius_mm, center.y],
+                    center_mm: [center.x, center.y],
+                    radius_mm,
+                    sweep_deg: 180.0,
+                };
+                Self::Path { edges: vec![half(1.0), half(-1.0)] }
+            }
+            Outline::Circle { radius_mm, .. } => Self::Circle { radius_mm },
             Outline::Edges(edges) => Self::Path { edges: edges.into_iter().map(Into::into).collect() },
         }
     }

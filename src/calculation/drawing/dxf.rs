@@ -293,43 +293,42 @@ impl Dxf<'_> {
         placement: &PlacementAnswer,
         &Layer(layer, _): &Layer,
     ) -> io::Result<()> {
-        let (kind, class) = match outline {
-            OutlineAnswer::Circle { .. } => ("CIRCLE", "AcDbCircle"),
-            OutlineAnswer::Path { .. } => ("LWPOLYLINE", "AcDbPolyline"),
-        };
+        let place = placement.placing();
+        if let Some((center_mm, radius_mm)) = outline.circle() {
+            self.entity("CIRCLE", "AcDbCircle", layer)?;
+            self.point(10, place(center_mm))?;
+            self.number(30, 0.0)?;
+            return self.number(40, radius_mm);
+        }
+        let OutlineAnswer::Path { edges } = outline else { return Ok(()) };
+        self.entity("LWPOLYLINE", "AcDbPolyline", layer)?;
+        let vertices: usize = edges.iter().map(vertex_count).sum();
+        write!(self.writer, " 90\r\n{vertices}\r\n")?;
+        self.integer(70, 1)?; // closed
+        for edge in edges {
+            match edge {
+                EdgeAnswer::Line { .. } => self.point(10, place(edge.start()))?,
+                EdgeAnswer::Arc { sweep_deg, .. } => {
+                    self.point(10, place(edge.start()))?;
+                    // The bulge of a polyline is the tangent of a quarter of its arc's angle.
+                    self.number(42, (0.25 * sweep_deg.to_radians()).tan())?;
+                }
+                EdgeAnswer::Curve { arcs, .. } => {
+                    for &[x, y, bulge] in arcs {
+                        self.point(10, place([x, y]))?;
+                        self.number(42, bulge)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn entity(&mut self, kind: &str, class: &str, layer: &str) -> io::Result<()> {
         self.object(kind, MODEL_SPACE)?;
         self.text(100, "AcDbEntity")?;
         self.text(8, layer)?;
-        self.text(100, class)?;
-        match outline {
-            OutlineAnswer::Circle { radius_mm } => {
-                self.point(10, [placement.x_mm, placement.y_mm])?;
-                self.number(30, 0.0)?;
-                self.number(40, *radius_mm)
-            }
-            OutlineAnswer::Path { edges } => {
-                let vertices: usize = edges.iter().map(vertex_count).sum();
-                write!(self.writer, " 90\r\n{vertices}\r\n")?;
-                self.integer(70, 1)?; // closed
-                let place = placement.placing();
-                for edge in edges {
-                    match edge {
-                        EdgeAnswer::Line { .. } => self.point(10, place(edge.start()))?,
-                        EdgeAnswer::Arc { sweep_deg, .. } => {
-                            self.point(10, place(edge.start()))?;
-                            // The bulge of a polyline is the tangent of a quarter of its arc's angle.
-                            self.number(42, (0.25 * sweep_deg.to_radians()).tan())?;
-                        }
-                        EdgeAnswer::Curve { x_mm, y_mm, .. } => {
-                            for (&x, &y) in x_mm.iter().zip(y_mm).take(vertex_count(edge)) {
-                                self.point(10, place([x, y]))?;
-                            }
-                        }
-                    }
-                }
-                Ok(())
-            }
-        }
+        self.text(100, class)
     }
 
     /// The named dictionaries: of groups, empty, and of plot styles, which every layer has to have one of.
@@ -362,6 +361,6 @@ impl Dxf<'_> {
 const fn vertex_count(edge: &EdgeAnswer) -> usize {
     match edge {
         EdgeAnswer::Line { .. } | EdgeAnswer::Arc { .. } => 1,
-        EdgeAnswer::Curve { x_mm, .. } => x_mm.len() - 1,
+        EdgeAnswer::Curve { arcs, .. } => arcs.len(),
     }
 }

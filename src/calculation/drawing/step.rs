@@ -60,9 +60,9 @@ enum Side {
     Line {
         end: [f64; 2],
     },
-    /// Around the origin.
     Arc {
         end: [f64; 2],
+        center: [f64; 2],
         radius_mm: f64,
         is_counter_clockwise: bool,
     },
@@ -312,8 +312,8 @@ impl Step<'_> {
                 let [x, y] = unit([end[0] - start[0], end[1] - start[1]]);
                 Ok((self.line(point, [x, y, 0.0])?, ".T."))
             }
-            Side::Arc { radius_mm, is_counter_clockwise, .. } => {
-                let place = self.placement([0.0, 0.0, z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
+            Side::Arc { center: [x, y], radius_mm, is_counter_clockwise, .. } => {
+                let place = self.placement([*x, *y, z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
                 let circle = self.record(format_args!("CIRCLE('',{place},{})", Real(*radius_mm)))?;
                 Ok((circle, if *is_counter_clockwise { ".T." } else { ".F." }))
             }
@@ -364,8 +364,8 @@ impl Step<'_> {
                 let place = self.placement([start[0], start[1], bottom.z_mm], [y, -x, 0.0], [x, y, 0.0])?;
                 Ok((self.record(format_args!("PLANE('',{place})"))?, ".T."))
             }
-            Side::Arc { radius_mm, is_counter_clockwise, .. } => {
-                let place = self.placement([0.0, 0.0, bottom.z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
+            Side::Arc { center: [x, y], radius_mm, is_counter_clockwise, .. } => {
+                let place = self.placement([*x, *y, bottom.z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
                 let cylinder = self.record(format_args!("CYLINDRICAL_SURFACE('',{place},{})", Real(*radius_mm)))?;
                 // A cylinder's normal points away from its axis.
                 Ok((cylinder, if *is_counter_clockwise { ".T." } else { ".F." }))
@@ -418,7 +418,12 @@ impl Step<'_> {
 fn sides(outline: &OutlineAnswer, is_hole: bool) -> Vec<Side> {
     let mut sides: Vec<_> = match outline {
         OutlineAnswer::Circle { radius_mm } => {
-            let half = |x: f64| Side::Arc { end: [x, 0.0], radius_mm: *radius_mm, is_counter_clockwise: !is_hole };
+            let half = |x: f64| Side::Arc {
+                end: [x, 0.0],
+                center: [0.0; 2],
+                radius_mm: *radius_mm,
+                is_counter_clockwise: !is_hole,
+            };
             // Halves, because an edge from a corner to itself is not every reader's strength. A hole's are the same ones.
             return vec![half(-radius_mm), half(*radius_mm)];
         }
@@ -428,9 +433,9 @@ fn sides(outline: &OutlineAnswer, is_hole: bool) -> Vec<Side> {
                 let end = if is_hole { edge.start() } else { edge.end() };
                 match edge {
                     EdgeAnswer::Line { .. } => vec![Side::Line { end }],
-                    EdgeAnswer::Arc { radius_mm, sweep_deg, .. } => {
+                    EdgeAnswer::Arc { center_mm, radius_mm, sweep_deg, .. } => {
                         let is_counter_clockwise = (*sweep_deg > 0.0) != is_hole;
-                        vec![Side::Arc { end, radius_mm: *radius_mm, is_counter_clockwise }]
+                        vec![Side::Arc { end, center: *center_mm, radius_mm: *radius_mm, is_counter_clockwise }]
                     }
                     EdgeAnswer::Curve { polynomials, .. } if is_hole => {
                         let back = |poles: &Vec<[f64; 2]>| Side::Curve(poles.iter().rev().copied().collect());

@@ -55,7 +55,7 @@ pub(super) fn title(drawing: &DrawingAnswer) -> String {
 pub(super) fn reach_mm(bodies: &[BodyAnswer]) -> f64 {
     let of_edge = |edge: &EdgeAnswer| match edge {
         EdgeAnswer::Line { x_mm, y_mm } => farthest(x_mm, y_mm),
-        EdgeAnswer::Arc { radius_mm, .. } => *radius_mm,
+        EdgeAnswer::Arc { center_mm: [x, y], radius_mm, .. } => x.hypot(*y) + radius_mm,
         EdgeAnswer::Curve { x_mm, y_mm, .. } => farthest(x_mm, y_mm),
     };
     let of_body = |body: &BodyAnswer| {
@@ -92,7 +92,7 @@ fn write_outline(outline: &OutlineAnswer, placement: &PlacementAnswer, writer: &
                         let [x, y] = place([x_mm[1], y_mm[1]]);
                         write!(writer, "L{x} {y}")?;
                     }
-                    EdgeAnswer::Arc { x_mm, y_mm, radius_mm, sweep_deg } => {
+                    EdgeAnswer::Arc { x_mm, y_mm, radius_mm, sweep_deg, .. } => {
                         let [x, y] = place([x_mm[2], y_mm[2]]);
                         let (large, counter_clockwise) =
                             (u8::from(sweep_deg.abs() > 180.0), u8::from(*sweep_deg > 0.0));

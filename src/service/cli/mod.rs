@@ -20,6 +20,7 @@ use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::convert::converted;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::drawing::preset::Preset;
 use toothwave_calculation::forms::Format;
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::sweep::Sweep;
@@ -61,7 +62,7 @@ enum Command {
     /// Measure the error and the time of each computation method for a design
     #[command(after_help = "Example: toothwave accuracy design.json")]
     Accuracy(Offline),
-    /// Write one part, or the assembly, as DXF, STEP or SVG
+    /// Write one part, or the assembly, as DXF, STEP, SVG, 3MF or STL
     #[command(after_help = "Example: toothwave draw ring design.json --format dxf > ring.dxf")]
     Draw {
         /// The part
@@ -72,6 +73,9 @@ enum Command {
         /// Format of the drawing
         #[arg(long, value_parser = one_of(&FORMATS), default_value = "dxf")]
         format: Format,
+        /// Set each `parts.*.clearance_um` to 50, so that each contact has a gap of 0.1 mm
+        #[arg(long)]
+        printing: bool,
     },
     /// Compute many designs, one a line, on all cores; write the answers as NDJSON in the same order
     #[command(after_help = "Example: toothwave batch designs.ndjson --peaks-only > answers.ndjson")]
@@ -170,7 +174,10 @@ pub fn run() -> ExitCode {
         Command::CoincidenceDegree(offline) => answer(CoincidenceDegree, &offline.file, offline.format),
         Command::Sweep(offline) => answer(Sweep, &offline.file, offline.format),
         Command::Accuracy(offline) => answer(Accuracy, &offline.file, offline.format),
-        Command::Draw { part, file, format } => answer(Drawing(part), &file, format),
+        Command::Draw { part, file, format, printing } => {
+            let preset = if printing { Preset::Printing } else { Preset::Document };
+            answer(Drawing { part, preset }, &file, format)
+        }
         Command::Batch { file, endpoint, peaks_only } => batch::run(&file, BatchQuery { endpoint, peaks_only }),
         Command::Study { file, format } => study::run(&file, format),
         Command::Convert { file } => convert(&file),

@@ -30,15 +30,18 @@ const fn choice<T>(value: T, word: &'static str, help: &'static str) -> Choice<T
     Choice { value, word, alias: None, help }
 }
 
-pub(super) const FORMATS: [Choice<Format>; 8] = [
+pub(super) const FORMATS: [Choice<Format>; 11] = [
     choice(Format::Json, "json", "For programs"),
     choice(Format::Csv, "csv", "Columns as comma-separated values"),
+    choice(Format::CsvComma, "csv-comma", "Columns with a decimal comma, semicolons between them"),
     choice(Format::Arrow, "arrow", "Columns as an Apache Arrow stream"),
     choice(Format::Parquet, "parquet", "Columns as an Apache Parquet file"),
     Choice { value: Format::Text, word: "text", alias: Some("table"), help: "Summary for a terminal" },
     choice(Format::Svg, "svg", "Image"),
     choice(Format::Dxf, "dxf", "Outlines for CAD and manufacturing"),
     choice(Format::Step, "step", "Solids for CAD"),
+    choice(Format::ThreeMf, "3mf", "Meshes for printers"),
+    choice(Format::Stl, "stl", "One mesh for printers that read no 3MF"),
 ];
 
 pub(super) const PARTS: [Choice<DrawnPart>; 5] = [
@@ -89,7 +92,7 @@ pub(super) fn read(file: &Path) -> Result<Vec<u8>, Failure> {
 /// Checks that the answer type has this format.
 pub(super) fn require_form<A: Forms>(format: Format) -> Result<(), Failure> {
     let known: Vec<_> = iter::once(Format::Json).chain(A::FORMS.iter().map(|(format, _)| *format)).collect();
-    if known.contains(&format) {
+    if known.contains(&format.offered()) {
         return Ok(());
     }
     let name = |format: &Format| FORMATS.iter().find(|choice| choice.value == *format).map_or("", |choice| choice.word);

@@ -154,9 +154,9 @@ struct DocumentRequest {
 impl DocumentRequest {
     async fn read<Q: Question>(app: &App, deadline: Deadline, request: Request) -> Result<Self, Problem> {
         let (Parts { headers, uri, .. }, body) = request.into_parts();
-        negotiation::require_no_query(&uri)?;
+        let formats = negotiation::formats::<Q::Answer>(&uri)?;
         negotiation::require_json(&headers)?;
-        let representation = Representation::negotiate(&headers, Q::Answer::FORMS.iter().map(|(format, _)| *format))?;
+        let representation = Representation::negotiate(&headers, formats)?;
         let body = read_body(app, deadline, &headers, body).await?;
         Ok(Self { headers, body, representation })
     }
@@ -374,7 +374,7 @@ pub fn body_response(body: Bytes, Representation { format, gzip }: Representatio
     let headers = response.headers_mut();
     // Space for these headers and those of the middleware.
     headers.reserve(12);
-    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(negotiation::content_type(format)));
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(format.media_type()));
     if gzip {
         headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
     }

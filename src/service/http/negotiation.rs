@@ -4,41 +4,15 @@ use std::borrow::Cow;
 use std::iter;
 use std::str::FromStr;
 
+use axum::extract::Query;
 use axum::http::{HeaderMap, HeaderName, Uri, header};
 use headers_accept::Accept;
-use mediatype::{MediaType, Name, names};
-use toothwave_calculation::forms::Format;
+use mediatype::{MediaType, names};
+use serde::de::DeserializeOwned;
+use toothwave_calculation::forms::{CsvOptions, Format, Forms};
 use toothwave_calculation::key::{Encode, Encoder};
 
 use super::problem::{Problem, ProblemCode};
-
-/// Returns the media type of a format.
-const fn media_type(format: Format) -> MediaType<'static> {
-    match format {
-        Format::Json => MediaType::new(names::APPLICATION, names::JSON),
-        Format::Csv => MediaType::new(names::TEXT, Name::new_unchecked("csv")),
-        Format::Arrow => MediaType::new(names::APPLICATION, Name::new_unchecked("vnd.apache.arrow.stream")),
-        Format::Parquet => MediaType::new(names::APPLICATION, Name::new_unchecked("vnd.apache.parquet")),
-        Format::Text => MediaType::new(names::TEXT, names::PLAIN),
-        Format::Svg => MediaType::from_parts(names::IMAGE, names::SVG, Some(names::XML), &[]),
-        Format::Dxf => MediaType::new(names::IMAGE, Name::new_unchecked("vnd.dxf")),
-        Format::Step => MediaType::new(names::MODEL, Name::new_unchecked("step")),
-    }
-}
-
-/// Returns the `Content-Type` of an answer in a format.
-pub const fn content_type(format: Format) -> &'static str {
-    match format {
-        Format::Json => "application/json",
-        Format::Csv => "text/csv; charset=utf-8; header=present",
-        Format::Arrow => "application/vnd.apache.arrow.stream",
-        Format::Parquet => "application/vnd.apache.parquet",
-        Format::Text => "text/plain; charset=utf-8",
-        Format::Svg => "image/svg+xml",
-        Format::Dxf => "image/vnd.dxf",
-        Format::Step => "model/step",
-    }
-}
 
 /// Longest `Accept` or `Accept-Encoding` list that is read, in bytes. Browsers send some hundred bytes.
 const MOST_OF_A_LIST: usize = 4096;
@@ -75,14 +49,13 @@ impl Representation {
         if accepted.trim().is_empty() {
             return Ok(Self { format: Format::Json, gzip });
         }
-        let formats: Vec<_> = iter::once(Format::Json).chain(others).collect();
-        let media_types: Vec<_> = formats.iter().copied().map(media_type).collect();
-        let best = Accept::from_str(&without_parameters(&accepted))
-            .ok()
-            .and_then(|accept| accept.negotiate(&media_types).cloned());
-        let format = formats.iter().copied().find(|format| best.as_ref() == Some(&media_type(*format)));
+        let formats = iter::once(Format::Json).chain(others);
+        let offered: Vec<_> = formats.filter_map(|format| Some((format, media_type(format)?))).collect();
+        let accept = Accept::from_str(&without_parameters(&accepted)).ok();
+        let best = accept.and_then(|accept| accept.negotiate(offered.iter().map(|(_, media_type)| media_type)));
+        let format = offered.iter().find(|(_, media_type)| Some(media_type) == best).map(|(format, _)| *format);
         let format = format.ok_or_else(|| {
-            let offered: Vec<_> = media_types.iter().map(ToString::to_string).collect();
+            let offered: Vec<_> = offered.iter().map(|(_, media_type)| media_type.to_string()).collect();
             Problem::new(
                 ProblemCode::NotAcceptable,
                 format!("the header `Accept` allows no available media type. Accept {}", offered.join(" or ")),
@@ -90,6 +63,26 @@ impl Representation {
         })?;
         Ok(Self { format, gzip })
     }
+}
+
+/// A media type without its parameters.
+fn media_type(format: Format) -> Option<MediaType<'static>> {
+    MediaType::parse(format.media_type().split(';').next()?).ok()
+}
+
+/// The query of a request. A misspelled name is not ignored.
+pub fn query<T: DeserializeOwned>(uri: &Uri) -> Result<T, Problem> {
+    let query = Query::try_from_uri(uri).map(|Query(query)| query);
+    query.map_err(|error| Problem::new(ProblemCode::InvalidQuery, error.body_text()))
+}
+
+/// The formats of an answer beside JSON. If CSV is one of them, the query may name its decimal sign.
+pub fn formats<A: Forms>(uri: &Uri) -> Result<impl Iterator<Item = Format>, Problem> {
+    let formats = A::FORMS.iter().map(|(format, _)| *format);
+    let has_csv = formats.clone().any(|format| format == Format::Csv);
+    let options: CsvOptions =
+        if has_csv { query(uri)? } else { require_no_query(uri).map(|()| CsvOptions::default())? };
+    Ok(formats.map(move |format| options.decimal.of(format)))
 }
 
 /// Checks that the request has no query, so that a misspelled one is not ignored.

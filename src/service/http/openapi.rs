@@ -8,7 +8,7 @@ const SCHEMAS: &str = "/components/schemas";
 
 /// Adds what utoipa cannot express: the server, one `Problem` for all, and named variants with a discriminator.
 pub(crate) fn for_generators(document: &mut Value) {
-    document["servers"] = json!([{ "url": "/", "description": "The service that serves this document." }]);
+    document["servers"] = json!([{ "url": ".", "description": "The service that serves this document." }]);
     for_each_object(document, &mut |object| {
         if let Some(media) = object.get_mut(PROBLEM_JSON) {
             *media = json!({ "schema": reference("Problem") });
@@ -97,18 +97,11 @@ fn name_variants(document: &mut Value) {
     for (name, schema) in schemas.iter_mut() {
         let Some(tag) = tag_of(schema) else { continue };
         let mut mapping = Map::new();
-        let mut by_default = None;
         for variant in schema["oneOf"].as_array_mut().into_iter().flatten() {
             let Some(word) = word_of(variant, &tag).map(str::to_owned) else { continue };
-            by_default = without_tag(variant, &tag).or(by_default);
             let variant_name = format!("{name}{}", capitalised(&word));
             mapping.insert(word, json!(format!("#{SCHEMAS}/{variant_name}")));
             named.insert(variant_name.clone(), std::mem::replace(variant, reference(&variant_name)));
-        }
-        if let (Some(variant), Some(variants)) = (by_default, schema["oneOf"].as_array_mut()) {
-            let variant_name = format!("{name}ByDefault");
-            variants.push(reference(&variant_name));
-            named.insert(variant_name, variant);
         }
         schema["discriminator"] = json!({ "propertyName": tag, "mapping": mapping });
     }
@@ -128,20 +121,6 @@ fn word_of<'a>(variant: &'a Value, tag: &str) -> Option<&'a str> {
         [word] => word.as_str(),
         _ => None,
     }
-}
-
-/// Makes the tag of a variant required. If it was optional, returns a further variant without the tag. Generators tell
-/// variants apart by a common tag or by their fields.
-fn without_tag(variant: &mut Value, tag: &str) -> Option<Value> {
-    if variant.get("required").and_then(Value::as_array).is_some_and(|required| required.iter().any(|name| name == tag))
-    {
-        return None;
-    }
-    let mut by_default = variant.clone();
-    by_default.get_mut("properties")?.as_object_mut()?.remove(tag);
-    let required = variant.as_object_mut()?.entry("required").or_insert_with(|| json!([]));
-    required.as_array_mut()?.push(json!(tag));
-    Some(by_default)
 }
 
 fn capitalised(word: &str) -> String {
@@ -226,6 +205,23 @@ fn schema_as_3_0(object: &mut Map<String, Value>) {
         object.remove("$ref");
         object.insert("allOf".into(), json!([{ "$ref": target }]));
     }
+}
+
+/// The document as Swagger UI shows it below `/docs/`: the sweep first, and padlocks only if the service wants a key.
+pub(crate) fn for_swagger(document: &Value, wants_key: bool) -> Value {
+    let mut document = document.clone();
+    document["servers"][0]["url"] = json!("..");
+    // Groups stand in the order of the tags, paths within them in that of their names.
+    if let Some(tags) = document["tags"].as_array_mut() {
+        tags.insert(0, json!({ "name": "sweep", "description": "Forces and contact stresses: start here." }));
+    }
+    document["paths"]["/v1/sweep"]["post"]["tags"] = json!(["sweep"]);
+    if !wants_key {
+        for_each_object(&mut document, &mut |object| {
+            object.retain(|name, _| name != "security" && name != "securitySchemes");
+        });
+    }
+    document
 }
 
 fn for_each_object(value: &mut Value, change: &mut impl FnMut(&mut Map<String, Value>)) {

@@ -61,7 +61,6 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(service::metrics))
         .routes(routes!(studies::quantities))
         .routes(routes!(studies::study, studies::cancel))
-        .routes(routes!(studies::result))
         .routes(routes!(studies::events));
     OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(calculations::geometry))
@@ -72,7 +71,8 @@ fn api() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(drawings::drawing))
         .routes(routes!(batch::batch))
         .routes(routes!(studies::begin))
-        // Endpoints that read a document refuse a query themselves.
+        .routes(routes!(studies::result))
+        // These read their query, or refuse one, themselves.
         .merge(without_document.layer(middleware::from_fn(without_query)))
 }
 
@@ -165,7 +165,8 @@ fn describe_entry(document: &mut openapi::OpenApi) {
 /// Makes the router of the whole service.
 pub fn router(app: Arc<App>, access: &Access) -> Router {
     // Without "none", Swagger UI would call an external validator.
-    let config = Config::new(["/openapi.json"]).validator_url("none");
+    let config = Config::new(["openapi.json"]).validator_url("none");
+    let wants_key = access.keys.is_some();
     let docs: Router<Arc<App>> = SwaggerUi::new("/docs").config(config).into();
     let docs = docs.layer(middleware::map_response(as_documentation));
     let paths = API
@@ -173,8 +174,9 @@ pub fn router(app: Arc<App>, access: &Access) -> Router {
         .clone()
         .route("/", get(page::index))
         .route("/page/{*name}", get(page::asset))
-        .route("/openapi.json", get(openapi_document))
-        .route("/openapi-3.0.json", get(openapi_3_0_document))
+        .route("/openapi.json", get(|headers| api_file(0, headers)))
+        .route("/openapi-3.0.json", get(|headers| api_file(1, headers)))
+        .route("/docs/openapi.json", get(move |headers| api_file(2 + usize::from(wants_key), headers)))
         .merge(docs)
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed);
@@ -234,16 +236,15 @@ async fn without_query(request: Request, next: Next) -> Response {
     }
 }
 
-async fn openapi_document(headers: HeaderMap) -> Response {
-    static FILE: LazyLock<StaticFile> =
-        LazyLock::new(|| StaticFile::new("application/json", openapi_json().as_bytes()));
-    FILE.answer(&headers)
-}
+/// The API document, its rendering in OpenAPI 3.0, and what Swagger UI shows without and with keys.
+static API_FILES: LazyLock<[StaticFile; 4]> = LazyLock::new(|| {
+    let for_swagger = |wants_key| pretty(&super::openapi::for_swagger(&DOCUMENT, wants_key));
+    [openapi_json().into(), openapi_3_0_json().into(), for_swagger(false), for_swagger(true)]
+        .map(|text: String| StaticFile::new("application/json", text.into_bytes()))
+});
 
-async fn openapi_3_0_document(headers: HeaderMap) -> Response {
-    static FILE: LazyLock<StaticFile> =
-        LazyLock::new(|| StaticFile::new("application/json", openapi_3_0_json().as_bytes()));
-    FILE.answer(&headers)
+async fn api_file(index: usize, headers: HeaderMap) -> Response {
+    API_FILES[index].answer(&headers)
 }
 
 async fn not_found(request: Request) -> Problem {
@@ -261,6 +262,10 @@ async fn as_documentation(mut response: Response) -> Response {
     if matches!(response.status(), StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST) {
         return Problem::new(ProblemCode::NotFound, "the documentation has no such page. Start at `/docs`")
             .into_response();
+    }
+    if response.status().is_redirection() {
+        // From `/docs`, and relative, because a proxy may strip a prefix from the path.
+        response.headers_mut().insert(header::LOCATION, HeaderValue::from_static("docs/"));
     }
     response.headers_mut().insert(header::CONTENT_SECURITY_POLICY, DOCS_POLICY);
     response

@@ -26,14 +26,15 @@ struct Coded {
 
 impl StaticFile {
     /// Compresses the file.
-    pub fn new(content_type: &'static str, body: &'static [u8]) -> Self {
-        let hash = blake3::hash(body).to_hex();
+    pub fn new(content_type: &'static str, body: impl Into<Bytes>) -> Self {
+        let body = body.into();
+        let hash = blake3::hash(&body).to_hex();
         let mut encoder = GzEncoder::new(Vec::with_capacity(body.len() / 2), Compression::best());
         // Writing to memory does not fail. If it did, the uncompressed file would be served.
-        let gzip = encoder.write_all(body).and_then(|()| encoder.finish()).unwrap_or_default();
+        let gzip = encoder.write_all(&body).and_then(|()| encoder.finish()).unwrap_or_default();
         Self {
             content_type,
-            plain: Coded { body: Bytes::from_static(body), etag: format!("\"{}\"", &hash[..32]) },
+            plain: Coded { body, etag: format!("\"{}\"", &hash[..32]) },
             gzip: Coded { body: gzip.into(), etag: format!("\"{}-gzip\"", &hash[..32]) },
         }
     }

@@ -69,9 +69,9 @@ pub struct StudyResource {
     pub looked_at: u64,
     /// Computed variants without an answer. A search counts those of its scan alone.
     pub impossible: u64,
-    /// Path of the result. It is partial while the study runs.
+    /// Path of the result below the service's address. It is partial while the study runs.
     pub result_href: String,
-    /// Path of the progress events.
+    /// Path of the progress events below the service's address.
     pub events_href: String,
     /// Problem of a failed study.
     #[serde(skip_serializing_if = "Option::is_none")]

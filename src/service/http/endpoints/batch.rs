@@ -10,8 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::body::Body;
-use axum::extract::rejection::QueryRejection;
-use axum::extract::{Query, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
@@ -443,20 +442,12 @@ async fn read_ahead(app: &App, body: Body) -> Result<Body, Problem> {
         (status = 503, description = "The limit of running batches is reached. `Retry-After` has the seconds until a retry.", body = Problem, content_type = "application/problem+json", headers(("Retry-After" = u32, description = "Seconds")))
     )
 )]
-pub async fn batch(
-    State(app): State<Arc<App>>,
-    query: Result<Query<BatchQuery>, QueryRejection>,
-    request: Request,
-) -> Response {
-    begin(app, query, request).await.unwrap_or_else(IntoResponse::into_response)
+pub async fn batch(State(app): State<Arc<App>>, request: Request) -> Response {
+    begin(app, request).await.unwrap_or_else(IntoResponse::into_response)
 }
 
-async fn begin(
-    app: Arc<App>,
-    query: Result<Query<BatchQuery>, QueryRejection>,
-    request: Request,
-) -> Result<Response, Problem> {
-    let Query(query) = query.map_err(|error| Problem::new(ProblemCode::InvalidQuery, error.body_text()))?;
+async fn begin(app: Arc<App>, request: Request) -> Result<Response, Problem> {
+    let query: BatchQuery = negotiation::query(request.uri())?;
     query.require_possible()?;
     negotiation::require_ndjson(request.headers())?;
     let place = app.pool.begin_batch()?;

@@ -8,6 +8,7 @@ use axum::response::Response;
 use toothwave_calculation::accuracy::{Accuracy, AccuracyAnswer};
 use toothwave_calculation::coincidence_degree::{CoincidenceDegree, CoincidenceDegreeAnswer};
 use toothwave_calculation::design::Design;
+use toothwave_calculation::forms::CsvOptions;
 use toothwave_calculation::geometry::{Geometry, GeometryAnswer};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_calculation::sweep::answer::SweepAnswer;
@@ -21,7 +22,7 @@ use crate::http::answer::{Problems, respond, respond_uncached};
     path = "/v1/geometry",
     tag = "drive",
     request_body(content = Design, description = "A design document. This endpoint reads `drive` and `profile`."),
-    params(("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
+    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
     responses(
         (status = 200, description = "The profiles and key figures.", 
             content((GeometryAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))),
@@ -39,7 +40,7 @@ pub async fn geometry(State(app): State<Arc<App>>, request: Request) -> Response
     path = "/v1/coincidence-degree",
     tag = "drive",
     request_body(content = Design, description = "A design document. This endpoint reads `drive`."),
-    params(("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
+    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
     responses(
         (status = 200, description = "The contact ratio.", 
             content((CoincidenceDegreeAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))),
@@ -57,7 +58,7 @@ pub async fn coincidence_degree(State(app): State<Arc<App>>, request: Request) -
     path = "/v1/sweep",
     tag = "drive",
     request_body(content = Design, description = "A design document. This endpoint reads all of it except `profile`. `load` is required."),
-    params(("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
+    params(CsvOptions, ("If-None-Match" = Option<String>, Header, description = "Entity tags of the responses that the client has.")),
     responses(
         (status = 200, description = "The sweep. CSV has one line for each state and the columns of `states`. The Apache Arrow stream has the same columns. Text is a summary, and SVG has the plots.",
             content((SweepAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"), (String = "application/vnd.apache.arrow.stream"), (String = "image/svg+xml"))),
@@ -76,6 +77,7 @@ pub async fn sweep(State(app): State<Arc<App>>, request: Request) -> Response {
     path = "/v1/accuracy",
     tag = "drive",
     request_body(content = Design, description = "A design document. This endpoint reads `drive`, `materials`, `load`, `model` and `accuracy`. `load` is required."),
+    params(CsvOptions),
     responses((status = 200, description = "The methods, each with its error and its time.",
         content((AccuracyAnswer = "application/json"), (String = "text/plain"), (String = "text/csv"))), Problems)
 )]

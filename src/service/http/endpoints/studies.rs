@@ -9,12 +9,12 @@ use axum::Json;
 use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream;
 use serde::Serialize;
-use toothwave_calculation::forms::{Form, Format, Forms};
+use toothwave_calculation::forms::{CsvOptions, Form, Format, Forms};
 use toothwave_calculation::json::word;
 use toothwave_study::{QUANTITIES, Quantity, Study, StudyAnswer, StudyDocument};
 use tracing::Instrument as _;
@@ -61,7 +61,7 @@ pub async fn quantities() -> Json<QuantitiesAnswer> {
     params(("Prefer" = Option<String>, Header, description = "RFC 7240: with `wait=N` the response waits for the end of the study, at most N seconds and at most the service's deadline.")),
     responses(
         (status = 200, description = "The study has ended. The response has its result, which may be partial.", body = StudyResource),
-        (status = 202, description = "The study runs. `Location` has its path.", body = StudyResource, headers(("Location" = String, description = "Path of the study."))),
+        (status = 202, description = "The study runs. `Location` has its path.", body = StudyResource, headers(("Location" = String, description = "Path of the study, relative to this path."))),
         Problems,
         (status = 404, description = "The study was removed before the response: by a client, or to free memory for another study. Request it again.", body = Problem, content_type = "application/problem+json"),
         (status = 501, description = "The service was started without studies.", body = Problem, content_type = "application/problem+json")
@@ -119,7 +119,7 @@ pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
     get,
     path = "/v1/studies/{id}/result",
     tag = "studies",
-    params(("id" = String, Path, description = "The `id` of the study.")),
+    params(CsvOptions, ("id" = String, Path, description = "The `id` of the study.")),
     responses(
         (status = 200, description = "The result. `is_complete` is true if all variants are computed. CSV has one line for each row of the study; Apache Parquet has the same columns.",
             content((StudyAnswer = "application/json"), (String = "text/csv"), (String = "application/vnd.apache.parquet"))),
@@ -133,11 +133,13 @@ pub async fn cancel(State(app): State<Arc<App>>, id: Result<Path<String>, PathRe
 pub async fn result(
     State(app): State<Arc<App>>,
     id: Result<Path<String>, PathRejection>,
+    uri: Uri,
     headers: HeaderMap,
 ) -> Response {
     let answer = async {
+        let formats = negotiation::formats::<StudyAnswer>(&uri)?;
         let record = find(&app, id)?;
-        let representation = Representation::negotiate(&headers, StudyAnswer::FORMS.iter().map(|(format, _)| *format))?;
+        let representation = Representation::negotiate(&headers, formats)?;
         answer_response(&app, &record, representation, |answer| answer).await
     };
     no_store(answer.await.unwrap_or_else(IntoResponse::into_response))
@@ -260,7 +262,8 @@ async fn respond_with_study(app: &Arc<App>, request: Request) -> Result<Response
     }
     let resource = record.resource();
     let mut response = if resource.state == StudyState::Running {
-        let location = format!("/v1/studies/{}", resource.id);
+        // Relative, because a proxy may strip a prefix from the path.
+        let location = format!("studies/{}", resource.id);
         (StatusCode::ACCEPTED, [(header::LOCATION, location)], Json(resource)).into_response()
     } else {
         let with_result = move |answer| StudyResource { result: Some(answer), ..resource };
