@@ -1,6 +1,7 @@
 //! HTTP: connections, routes, request processing, problems.
 
 pub mod answer;
+pub mod docs;
 pub mod endpoints;
 pub mod examples;
 pub mod negotiation;

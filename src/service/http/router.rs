@@ -20,9 +20,9 @@ use utoipa::openapi::{self, Content, HeaderBuilder, Ref, RefOr, ResponseBuilder}
 use utoipa::{OpenApi, PartialSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
-use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use super::answer::{CACHE_STATUS, SERVER_TIMING};
+use super::docs;
 use super::endpoints::{batch, calculations, design, drawings, service, studies};
 use super::negotiation::require_no_query;
 use super::observe;
@@ -164,11 +164,7 @@ fn describe_entry(document: &mut openapi::OpenApi) {
 
 /// Makes the router of the whole service.
 pub fn router(app: Arc<App>, access: &Access) -> Router {
-    // Without "none", Swagger UI would call an external validator.
-    let config = Config::new(["openapi.json"]).validator_url("none");
     let wants_key = access.keys.is_some();
-    let docs: Router<Arc<App>> = SwaggerUi::new("/docs").config(config).into();
-    let docs = docs.layer(middleware::map_response(as_documentation));
     let paths = API
         .0
         .clone()
@@ -177,7 +173,9 @@ pub fn router(app: Arc<App>, access: &Access) -> Router {
         .route("/openapi.json", get(|headers| api_file(0, headers)))
         .route("/openapi-3.0.json", get(|headers| api_file(1, headers)))
         .route("/docs/openapi.json", get(move |headers| api_file(2 + usize::from(wants_key), headers)))
-        .merge(docs)
+        .route("/docs", get(docs::redirect))
+        .route("/docs/", get(docs::index))
+        .route("/docs/{*name}", get(docs::asset))
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed);
     with_layers(paths, app, access)
@@ -250,25 +248,6 @@ async fn api_file(index: usize, headers: HeaderMap) -> Response {
 async fn not_found(request: Request) -> Problem {
     let detail = format!("there is no path `{}`. `/docs` lists the paths", request.uri().path());
     Problem::new(ProblemCode::NotFound, detail)
-}
-
-/// Swagger UI sets styles itself and draws with data URLs.
-const DOCS_POLICY: HeaderValue = HeaderValue::from_static(
-    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'",
-);
-
-/// Replaces the 404 and 400 responses of Swagger UI by problems, and adds the policy.
-async fn as_documentation(mut response: Response) -> Response {
-    if matches!(response.status(), StatusCode::NOT_FOUND | StatusCode::BAD_REQUEST) {
-        return Problem::new(ProblemCode::NotFound, "the documentation has no such page. Start at `/docs`")
-            .into_response();
-    }
-    if response.status().is_redirection() {
-        // From `/docs`, and relative, because a proxy may strip a prefix from the path.
-        response.headers_mut().insert(header::LOCATION, HeaderValue::from_static("docs/"));
-    }
-    response.headers_mut().insert(header::CONTENT_SECURITY_POLICY, DOCS_POLICY);
-    response
 }
 
 async fn method_not_allowed(request: Request) -> Problem {
