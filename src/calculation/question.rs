@@ -1,9 +1,9 @@
 //! The steps from a document to an answer, which all questions share.
 
-pub use toothwave_solver::Stop;
 use toothwave_solver::backing::Backings;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::{LoadCase, Parameter, SolveError, Violation, model_error};
+pub use toothwave_solver::{Never, Stop};
 
 use crate::design::{Design, SeriesComplianceDocument};
 use crate::forms::{Format, Forms};
@@ -22,6 +22,9 @@ pub struct Limits {
 }
 
 impl Limits {
+    /// Limits without a server: about 2 GB of memory.
+    pub const OFFLINE: Self = Self::new(20_000_000, 20_000_000);
+
     /// Makes limits with the same number of states with and without a tolerance.
     pub const fn new(max_states: u64, max_profile_points: u64) -> Self {
         Self { max_states, max_profile_points, max_searched_states: max_states }

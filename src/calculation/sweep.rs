@@ -390,10 +390,14 @@ impl DutyAnswer {
 
 /// A column of the states.
 #[derive(Debug, Clone, Copy)]
-enum Column<'a> {
+pub enum Column<'a> {
+    /// Numbers.
     Numbers(&'a [f64]),
+    /// Whole numbers.
     Counts(&'a [u32]),
+    /// Whether something holds.
     Flags(&'a [bool]),
+    /// Where teeth roll.
     Rolls(&'a [RollsAnswer]),
 }
 
@@ -465,7 +469,7 @@ impl Column<'_> {
 
 impl SweepAnswer {
     /// The columns of the states by their names in JSON, those of the slips after them.
-    fn columns(&self) -> Vec<(&'static str, Column<'_>)> {
+    pub fn columns(&self) -> Vec<(&'static str, Column<'_>)> {
         let states = &self.states;
         let mut columns = vec![
             ("input_angle_deg", Column::Numbers(&states.input_angle_deg)),

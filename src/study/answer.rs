@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 use crate::map::MapAnswer;
 use crate::search::SearchAnswer;
 use crate::sensitivity::SensitivityAnswer;
-use crate::table::Table;
+use crate::table::{Table, TableColumn};
 use crate::tolerance::ToleranceAnswer;
 
 /// Answer of a study. It is partial while the study runs.
@@ -47,6 +47,11 @@ impl Forms for StudyAnswer {
 }
 
 impl StudyAnswer {
+    /// The columns of its table, which CSV and Parquet hold too.
+    pub fn columns(&self) -> Vec<TableColumn> {
+        self.table().into_columns()
+    }
+
     fn table(&self) -> Table<'_> {
         match self {
             Self::Map(map) => map.table(),

@@ -41,7 +41,8 @@ impl Limit {
             Bound::Is => (value - self.limit).abs(),
         };
         let scale = if self.limit == 0.0 { 1.0 } else { self.limit.abs() };
-        beyond.max(0.0) / scale
+        // Finite, so that JSON can keep it.
+        (beyond.max(0.0) / scale).min(f64::MAX)
     }
 
     /// True if a value is within 1 % of the limit.

@@ -219,6 +219,17 @@ impl Rows for Map {
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree {
         template.filled(&self.values(variant))
     }
+
+    fn places(&self) -> Vec<Column> {
+        let kind = |axis: &Axis| if axis.is_number { Content::Number } else { Content::Word };
+        let column = |(variable, axis): (&Variable, &Axis)| Column::new(variable.pointer.as_str(), kind(axis));
+        self.variables_with_axes().map(column).collect()
+    }
+
+    fn place(&self, variant: u64) -> Vec<Cell> {
+        let values = self.values(variant);
+        self.variables_with_axes().zip(values).map(|((variable, axis), value)| axis.cell(variable, value)).collect()
+    }
 }
 
 /// Map: quantities over a grid. Variants are numbered from 0; the last field of `over` varies fastest.

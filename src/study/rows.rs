@@ -18,6 +18,12 @@ use crate::variant::{GRAIN_BYTES, Template};
 pub(crate) trait Rows {
     /// Fills the template with the values of a variant.
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree;
+
+    /// The columns that tell a variant from others, beside its number.
+    fn places(&self) -> Vec<Column>;
+
+    /// The cells of these columns.
+    fn place(&self, variant: u64) -> Vec<Cell>;
 }
 
 /// Rows of consecutive variants.
@@ -137,6 +143,28 @@ impl RowsPart {
         let refusals = self.refusals.iter().map(RefusalNoted::bytes);
         let variants = size_of_val(self.answered.as_slice()) + size_of_val(self.refused.as_slice());
         variants + size_of_val(self.reasons.as_slice()) + columns.sum::<usize>() + refusals.sum::<usize>()
+    }
+
+    /// The same without what a table of its rows holds.
+    pub(crate) fn without_columns(&self) -> Self {
+        let Self { reasons, refusals, .. } = self.clone();
+        Self { reasons, refusals, ..Self::new(self.columns.len()) }
+    }
+
+    /// A row a variant.
+    pub(crate) fn table<'a>(
+        &'a self,
+        rows: &'a impl Rows,
+        quantities: impl Iterator<Item = &'static str>,
+    ) -> Table<'a> {
+        let view = RowsView {
+            answered: &self.answered,
+            columns: quantities.zip(self.columns.iter().map(Vec::as_slice)).collect(),
+            refused: &self.refused,
+            reasons: &self.reasons,
+            codes: self.refusals.iter().map(|noted| noted.reason.code.as_str()).collect(),
+        };
+        view.table(rows.places(), |variant| rows.place(variant))
     }
 
     fn push(&mut self, variant: u64, outcome: Outcome) {

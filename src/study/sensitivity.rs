@@ -183,6 +183,14 @@ impl Rows for Sensitivity {
     fn document<'t>(&self, template: &'t mut Template, variant: u64) -> &'t Tree {
         template.filled(&self.values(variant).map(Value::Number).collect::<Vec<_>>())
     }
+
+    fn places(&self) -> Vec<Column> {
+        self.inputs.iter().map(|input| Column::new(input.pointer.as_str(), Content::Number)).collect()
+    }
+
+    fn place(&self, variant: u64) -> Vec<Cell> {
+        self.values(variant).map(Cell::Number).collect()
+    }
 }
 
 /// Result of a sensitivity study.

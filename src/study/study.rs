@@ -1,7 +1,6 @@
 //! The engine of studies: pure chunks, and a merge that does not depend on their order.
 
-use std::collections::btree_map::Entry;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -16,18 +15,18 @@ use toothwave_calculation::question::{self, Question as _};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Stop;
 
-use crate::answer::StudyAnswer;
 use crate::ask::{all_named, beyond, fault};
 use crate::document::StudyDocument;
 use crate::evaluate::{Evaluator, Stopped};
 use crate::identity;
 use crate::limit;
-use crate::map::{Map, MapAnswer};
+use crate::map::Map;
 use crate::quantity::{Needs, QUANTITIES, Quantity};
-use crate::rows::{Rows, RowsPart, RowsParts, RowsWork};
+use crate::rows::{Rows, RowsPart, RowsWork};
 use crate::search::{Island, IslandPart, Search, SearchAnswer};
-use crate::sensitivity::{Sensitivity, SensitivityAnswer};
-use crate::tolerance::{Tolerance, ToleranceAnswer};
+use crate::sensitivity::Sensitivity;
+use crate::table::Table;
+use crate::tolerance::Tolerance;
 use crate::variant::{Domain, Template, Variable};
 
 /// Limits of studies.
@@ -41,20 +40,26 @@ pub struct Limits {
     pub max_study_bytes: u64,
 }
 
+impl Limits {
+    /// Limits without a server: 8 GiB of results.
+    pub const OFFLINE: Self =
+        Self { calculation: question::Limits::OFFLINE, max_study_variants: 1_000_000_000, max_study_bytes: 8 << 30 };
+}
+
 /// A checked study.
 #[derive(Debug)]
 pub struct Study {
     id: Key,
-    kind: Kind,
-    template: Template,
-    evaluator: Evaluator,
+    pub(crate) kind: Kind,
+    pub(crate) template: Template,
+    pub(crate) evaluator: Evaluator,
     variants: u64,
     /// Variants of a chunk with rows.
     chunk_variants: u64,
 }
 
 #[derive(Debug)]
-enum Kind {
+pub(crate) enum Kind {
     Map(Map),
     Search(Box<Search>),
     Sensitivity(Sensitivity),
@@ -72,7 +77,7 @@ pub enum Part {
 
 impl Part {
     /// Frees unused capacity.
-    fn shrink(&mut self) {
+    pub(crate) fn shrink(&mut self) {
         if let Self::Rows(rows) = self {
             rows.shrink();
         }
@@ -264,8 +269,39 @@ impl Study {
         Self { chunk_variants: variants.max(1), ..self }
     }
 
+    /// Number of variants of a chunk with rows.
+    pub const fn chunk_variants(&self) -> u64 {
+        self.chunk_variants
+    }
+
+    /// Names of the quantities in the order of the columns.
+    pub(crate) fn quantities(&self) -> impl ExactSizeIterator<Item = &'static str> {
+        self.evaluator.quantities.iter().map(|quantity| quantity.name)
+    }
+
+    /// True if a chunk has one row for each variant. A chunk of a search is an island with designs.
+    pub const fn has_rows(&self) -> bool {
+        !matches!(self.kind, Kind::Search(_))
+    }
+
+    /// Returns the rows of a part as a table, or `None` for a search.
+    pub(crate) fn rows_table<'a>(&'a self, rows: &'a RowsPart) -> Option<Table<'a>> {
+        match &self.kind {
+            Kind::Map(map) => Some(rows.table(map, self.quantities())),
+            Kind::Sensitivity(sensitivity) => Some(rows.table(sensitivity, self.quantities())),
+            Kind::Tolerance(tolerance) => Some(rows.table(tolerance, self.quantities())),
+            Kind::Search(_) => None,
+        }
+    }
+
+    /// Returns the answer from one island of a search.
+    pub(crate) fn found_by(&self, island: &IslandPart) -> Option<SearchAnswer> {
+        let Kind::Search(search) = &self.kind else { return None };
+        Some(SearchAnswer::new(search, &self.template, &self.evaluator, [island].into_iter(), false))
+    }
+
     /// Returns the range of a chunk: its variants, or one island of a search.
-    fn span_of(&self, chunk: u64) -> Range<u64> {
+    pub fn span_of(&self, chunk: u64) -> Range<u64> {
         if matches!(self.kind, Kind::Search(_)) {
             return chunk..chunk + 1;
         }
@@ -591,79 +627,5 @@ impl Work {
     pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Stopped> {
         while !self.step(stop)? {}
         Ok(self.finish())
-    }
-}
-
-/// The parts of a study, added in any order.
-#[derive(Debug)]
-pub struct Gathered {
-    study: Arc<Study>,
-    /// Parts by chunk.
-    parts: BTreeMap<u64, Part>,
-    variants: u64,
-}
-
-impl Gathered {
-    /// Makes an empty collection.
-    pub fn new(study: &Arc<Study>) -> Self {
-        Self { study: Arc::clone(study), parts: BTreeMap::new(), variants: 0 }
-    }
-
-    /// Adds the part of a chunk. A duplicate or unknown chunk changes nothing.
-    pub fn add(&mut self, chunk: u64, mut part: Part) {
-        if chunk < self.study.chunks()
-            && let Entry::Vacant(place) = self.parts.entry(chunk)
-        {
-            part.shrink();
-            self.variants += part.variants();
-            place.insert(part);
-        }
-    }
-
-    /// True if all chunks have a part.
-    pub fn is_complete(&self) -> bool {
-        self.parts.len() as u64 == self.study.chunks()
-    }
-
-    /// Number of computed variants.
-    pub const fn variants(&self) -> u64 {
-        self.variants
-    }
-
-    /// Returns the result of the study from the parts so far.
-    pub fn answer(&self) -> StudyAnswer {
-        let study = &*self.study;
-        let (evaluator, is_complete) = (&study.evaluator, self.is_complete());
-        match &study.kind {
-            Kind::Map(map) => {
-                let rows = self.rows().joined(evaluator.quantities.len());
-                StudyAnswer::Map(MapAnswer::new(map, evaluator, rows, is_complete))
-            }
-            Kind::Search(search) => {
-                let islands = self.parts.values().filter_map(|part| match part {
-                    Part::Island(island) => Some(island),
-                    Part::Rows(_) => None,
-                });
-                let answer = SearchAnswer::new(search, &study.template, evaluator, islands, is_complete);
-                StudyAnswer::Search(Box::new(answer))
-            }
-            Kind::Sensitivity(sensitivity) => {
-                let rows = self.rows().joined(evaluator.quantities.len());
-                let answer = SensitivityAnswer::new(sensitivity, evaluator, &rows, is_complete);
-                StudyAnswer::Sensitivity(answer)
-            }
-            Kind::Tolerance(tolerance) => {
-                StudyAnswer::Tolerance(ToleranceAnswer::new(tolerance, evaluator, &self.rows(), is_complete))
-            }
-        }
-    }
-
-    /// Returns all rows so far.
-    fn rows(&self) -> RowsParts<'_> {
-        let rows = self.parts.values().filter_map(|part| match part {
-            Part::Rows(rows) => Some(rows),
-            Part::Island(_) => None,
-        });
-        RowsParts(rows.collect())
     }
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use parquet::basic::{LogicalType, Repetition, Type};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types;
@@ -51,6 +52,40 @@ pub(crate) enum Cell {
     Word(String),
 }
 
+/// A column of a table with its values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableColumn {
+    /// Its name.
+    pub name: String,
+    /// A value for each row.
+    pub values: Values,
+}
+
+/// The values of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Whole numbers, one in each row.
+    Counts(Vec<u64>),
+    /// Numbers; of an empty cell NaN.
+    Numbers(Vec<f64>),
+    /// Texts; of an empty cell none.
+    Words(Vec<Option<String>>),
+}
+
+impl Values {
+    fn push(&mut self, cell: Cell) {
+        match (self, cell) {
+            (Self::Counts(counts), Cell::Count(count)) => counts.push(count),
+            (Self::Counts(counts), _) => counts.push(0),
+            (Self::Numbers(numbers), Cell::Number(number)) => numbers.push(number),
+            (Self::Numbers(numbers), Cell::Count(count)) => numbers.push(count as f64),
+            (Self::Numbers(numbers), _) => numbers.push(f64::NAN),
+            (Self::Words(words), Cell::Empty) => words.push(None),
+            (Self::Words(words), cell) => words.push(Some(cell.text())),
+        }
+    }
+}
+
 impl Column {
     pub(crate) fn new(name: impl Into<String>, kind: Content) -> Self {
         Self { name: name.into(), kind }
@@ -86,11 +121,16 @@ impl Table<'_> {
     }
 
     /// Writes Apache Parquet with the same columns. An empty cell is null.
-    pub(crate) fn write_parquet(mut self, writer: &mut dyn Write) -> io::Result<()> {
+    pub(crate) fn write_parquet(self, writer: &mut dyn Write) -> io::Result<()> {
+        self.write_parquet_with(Vec::new(), writer)
+    }
+
+    /// Writes Apache Parquet with notes in the file's metadata.
+    pub(crate) fn write_parquet_with(mut self, notes: Vec<KeyValue>, writer: &mut dyn Write) -> io::Result<()> {
         let fields = self.columns.iter().map(|column| column.schema().map(Arc::new));
         let fields = fields.collect::<Result<_, _>>().map_err(parquet_error)?;
         let schema = types::Type::group_type_builder("study").with_fields(fields).build().map_err(parquet_error)?;
-        let properties = WriterProperties::builder().build();
+        let properties = WriterProperties::builder().set_key_value_metadata(Some(notes)).build();
         // Parquet needs to own its writer, so it gets a buffer that is emptied after each group.
         let file = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties));
         let mut file = file.map_err(parquet_error)?;
@@ -106,6 +146,25 @@ impl Table<'_> {
             // A group may have few bytes. The flush lets the writer check its stop flag.
             writer.flush()?;
         }
+    }
+
+    /// Returns each column as a whole.
+    pub(crate) fn into_columns(self) -> Vec<TableColumn> {
+        let empty = |column: Column| {
+            let values = match column.kind {
+                Content::Count => Values::Counts(Vec::with_capacity(self.length)),
+                Content::Number => Values::Numbers(Vec::with_capacity(self.length)),
+                Content::Word => Values::Words(Vec::with_capacity(self.length)),
+            };
+            TableColumn { name: column.name, values }
+        };
+        let mut columns: Vec<_> = self.columns.into_iter().map(empty).collect();
+        for row in self.rows {
+            for (column, cell) in columns.iter_mut().zip(row) {
+                column.values.push(cell);
+            }
+        }
+        columns
     }
 
     /// Estimated bytes that writing Parquet holds, without the answer and without the output.

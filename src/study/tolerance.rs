@@ -299,6 +299,28 @@ impl Rows for Tolerance {
         }
         template.filled(&numbers)
     }
+
+    fn places(&self) -> Vec<Column> {
+        let inputs = self.kinds.iter().filter(|kind| matches!(kind.place, Place::Number { .. }));
+        let mut columns = vec![Column::new("deviates", Content::Word)];
+        columns.extend(inputs.map(|kind| Column::new(kind.name.as_str(), Content::Number)));
+        columns
+    }
+
+    fn place(&self, variant: u64) -> Vec<Cell> {
+        let deviates = match self.drawn(variant) {
+            Drawn::Nominal => "nothing",
+            Drawn::All { .. } => "everything",
+            Drawn::Alone { kind, .. } => &self.kinds[kind].name,
+        };
+        let mut cells = vec![Cell::Word(deviates.into())];
+        cells.extend(self.kinds.iter().enumerate().filter_map(|(index, kind)| {
+            let Place::Number { value } = kind.place else { return None };
+            let drawn = self.stream(variant, index).map_or(0.0, |mut stream| kind.distribution.draw(&mut stream));
+            Some(Cell::Number(value + drawn))
+        }));
+        cells
+    }
 }
 
 /// Result of a tolerance study.

@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 use std::net::TcpListener;
+use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
 use serde_json::{Value, json};
@@ -59,6 +60,43 @@ async fn study_equals_that_of_service() {
     assert!(stdout(&output).strip_suffix('\n') == Some(served.text()), "{}", stdout(&output));
     let refused = run(&["study", "-"], br#"{ "study": "map", "base": {}, "over": {} }"#);
     assert_eq!((refused.status.code(), stderr(&refused).contains("/over")), (Some(2), true));
+}
+
+/// A folder of this process, removed in the end.
+struct Folder(PathBuf);
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // It may not have been made.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn jobs_of_an_array_give_the_whole_answer() {
+    let folder = Folder(std::env::temp_dir().join(format!("toothwave-array-{}", std::process::id())));
+    let path = folder.0.to_str().unwrap();
+    let over = json!({ "/drive/teeth/radius_mm": { "min": 3.0, "max": 9.0, "steps": 7 } });
+    let study = json!({ "study": "map", "base": shortest(), "over": over, "quantities": ["undercut"] }).to_string();
+    let ask = |arguments: &[&str]| run(&[&["study", "-"], arguments].concat(), study.as_bytes());
+    assert_eq!(
+        stderr(&ask(&["--part", "1/2", "--into", path])),
+        "part 1/2: computed 3 chunks, found 0; the study has 7\n"
+    );
+    let incomplete = ask(&["--merge", path]);
+    assert_eq!(incomplete.status.code(), Some(1));
+    assert!(stderr(&incomplete).contains("4 of 7 chunks are missing (0, 2, 4, 6)"), "{}", stderr(&incomplete));
+    assert!(String::from_utf8_lossy(&incomplete.stdout).contains(r#""is_complete":false"#));
+    assert!(ask(&["--part", "0/2", "--into", path]).status.success());
+    assert!(stderr(&ask(&["--part", "1/1", "--into", path])).contains("computed 0 chunks, found 7"));
+    assert_eq!(stdout(&ask(&["--merge", path])), stdout(&ask(&[])));
+    assert_eq!(stdout(&ask(&["--merge", path, "--rows"])), stdout(&ask(&["--format", "csv"])));
+    let other = study.replace("9.0", "8.0");
+    let refused = run(&["study", "-", "--merge", path], other.as_bytes());
+    assert_eq!((refused.status.code(), stderr(&refused).contains("another study")), (Some(2), true));
+    for wrong in [&["--part", "3/2", "--into", path][..], &["--part", "1/2"], &["--rows", "--format", "json"]] {
+        assert_eq!(ask(wrong).status.code(), Some(2), "{wrong:?}");
+    }
 }
 
 #[tokio::test]

@@ -12,7 +12,7 @@ use toothwave_study::{Gathered, Part, Study, Work};
 use crate::asking::{LIMITS, gathered, paper, study, text, with};
 
 /// Returns a study of each kind with several chunks each.
-fn studies() -> [Value; 4] {
+pub(crate) fn studies() -> [Value; 4] {
     let radius = |steps: u64| json!({ "min": 3.0, "max": 7.5, "steps": steps });
     let normal = json!({ "distribution": "normal", "sigma": 0.01, "limit": 0.03 });
     [

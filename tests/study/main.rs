@@ -10,5 +10,6 @@ mod defaults;
 mod deviations;
 mod engine;
 mod maps;
+mod parts;
 mod searches;
 mod tables;

@@ -22,7 +22,7 @@ fn cells_of_parquet(gathered: &Gathered) -> Vec<Vec<String>> {
     cells_of_file(bytes)
 }
 
-fn cells_of_file(bytes: Vec<u8>) -> Vec<Vec<String>> {
+pub(crate) fn cells_of_file(bytes: Vec<u8>) -> Vec<Vec<String>> {
     let file = SerializedFileReader::new(Bytes::from(bytes)).unwrap();
     let columns = file.metadata().file_metadata().schema().get_fields().iter();
     let mut cells = vec![columns.map(|column| column.name().to_owned()).collect::<Vec<_>>()];

@@ -5,9 +5,10 @@ use std::io::{self, BufRead, Write as _};
 use std::path::Path;
 
 use rayon::prelude::*;
+use toothwave_calculation::question::Limits;
 
 use super::Failure;
-use super::offline::{OFFLINE, log_errors, print, progress_bar};
+use super::offline::{log_errors, print, progress_bar};
 use crate::http::endpoints::batch::{BatchEnd, BatchQuery, computed_line};
 
 /// Lines that are computed before the first of them is written. Whole answers are long, so there are few.
@@ -43,7 +44,7 @@ pub(super) fn run(file: &Path, query: BatchQuery) -> Result<(), Failure> {
             let documents: Vec<_> = chunk.iter().filter(|line| !line.trim_ascii().is_empty()).zip(index..).collect();
             let answers: Vec<_> = documents
                 .par_iter()
-                .map(|&(document, index)| computed_line(query, index, document, &OFFLINE))
+                .map(|&(document, index)| computed_line(query, index, document, &Limits::OFFLINE))
                 .collect();
             index += documents.len() as u64;
             progress.set_message(format!("{index} designs"));

@@ -91,13 +91,7 @@ enum Command {
     },
     /// Compute many variants of one design on all cores: map, search, sensitivity or tolerance study
     #[command(after_help = "Example: toothwave study study.json --format csv > result.csv")]
-    Study {
-        /// A study document, or `-` for standard input
-        file: PathBuf,
-        /// Format of the answer
-        #[arg(long, value_parser = one_of(&FORMATS), default_value = "json")]
-        format: Format,
-    },
+    Study(study::StudyCommand),
     /// Print a document without its deprecated fields
     #[command(after_help = "Example: toothwave convert old.json > new.json")]
     Convert {
@@ -179,7 +173,7 @@ pub fn run() -> ExitCode {
             answer(Drawing { part, preset }, &file, format)
         }
         Command::Batch { file, endpoint, peaks_only } => batch::run(&file, BatchQuery { endpoint, peaks_only }),
-        Command::Study { file, format } => study::run(&file, format),
+        Command::Study(command) => study::run(&command),
         Command::Convert { file } => convert(&file),
         Command::Worker { .. } => Err(Failure::BadInput(
             "the commands `worker` and `migrate` were removed: `toothwave --studies FILE` computes its studies itself"

@@ -15,9 +15,6 @@ use toothwave_calculation::question::{Limits, Question};
 use super::Failure;
 use crate::http::problem::Problem;
 
-/// Limits without a server: about 2 GB of memory.
-pub(super) const OFFLINE: Limits = Limits::new(20_000_000, 20_000_000);
-
 /// A value of a command-line option: its word, an alias, and its help text.
 pub(super) struct Choice<T> {
     value: T,
@@ -68,7 +65,7 @@ pub(super) fn answer<Q: Question>(question: Q, file: &Path, format: Format) -> R
     log_errors();
     require_form::<Q::Answer>(format)?;
     let text = read(file)?;
-    print_answer(&question.ask(&text, &OFFLINE, &AtomicBool::new(false)).map_err(Problem::from)?, format)
+    print_answer(&question.ask(&text, &Limits::OFFLINE, &AtomicBool::new(false)).map_err(Problem::from)?, format)
 }
 
 /// Logs the causes of internal errors to standard error.
