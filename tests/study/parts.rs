@@ -10,7 +10,7 @@ use toothwave_calculation::forms::Format;
 use toothwave_solver::Never;
 use toothwave_study::{Gathered, PartError, PartFolder, Study, Work};
 
-use crate::asking::{LIMITS, gathered, paper, text};
+use crate::asking::{LIMITS, gathered, paper, text, with};
 use crate::engine::studies;
 use crate::tables::cells_of_file;
 
@@ -97,8 +97,9 @@ fn refuses_part_of_another_build() {
 #[test]
 fn part_holds_a_row_a_variant() {
     let normal = json!({ "distribution": "normal", "sigma": 0.01 });
+    let base = with(&paper(), "/model", json!({ "clearance": { "ring_um": 9.0 } }));
     let document = json!({
-        "study": "tolerance", "base": paper(), "samples": 40, "quantities": ["peak_stress_ring_mpa"],
+        "study": "tolerance", "base": base, "samples": 40, "quantities": ["peak_stress_ring_mpa"],
         "inputs": { "/drive/teeth/radius_mm": normal }, "deviations": { "ring_space_um": normal }
     });
     let study = in_chunks_of(&document, 1000);
