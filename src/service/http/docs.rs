@@ -56,7 +56,8 @@ static FILES: LazyLock<BTreeMap<&str, StaticFile>> = LazyLock::new(|| {
 /// A file of the archive, whose folder carries the version in its name.
 fn archived(name: &str) -> Option<Vec<u8>> {
     let mut archive = ZipArchive::new(Cursor::new(SWAGGER_UI_VENDORED)).ok()?;
-    let path = archive.file_names().find(|path| path.ends_with(&format!("/dist/{name}")))?.to_owned();
+    let suffix = format!("/dist/{name}");
+    let path = archive.file_names().flatten().find(|path| path.ends_with(&suffix))?.into_owned();
     let mut bytes = Vec::new();
     archive.by_name(&path).ok()?.read_to_end(&mut bytes).ok()?;
     Some(bytes)
