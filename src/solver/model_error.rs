@@ -254,7 +254,7 @@ impl MeasuredRange {
 }
 
 /// The expected error of the model, numerical ones apart: how far it was off elastic bodies, calculated by finite elements, in drives
-/// of the same case (docs/validation.md).
+/// of the same case (docs/explanation/validation.md).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct ModelError {

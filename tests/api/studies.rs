@@ -261,11 +261,11 @@ async fn search_frees_all_lengths_of_every_kind() {
     let schemas = &document()["components"]["schemas"];
     // Counts are not free, nor are grooves, which are optional.
     let apart = ["kind", "shape", "lobes", "count", "installed", "groove_radius_mm"];
-    for (union, place) in [("WaveGenerator", "/drive/wave_generator"), ("Teeth", "/drive/teeth")] {
-        let discriminator = &schemas[union]["discriminator"];
-        let tag = discriminator["propertyName"].as_str().unwrap();
-        for (word, reference) in discriminator["mapping"].as_object().unwrap() {
-            let name = reference.as_str().unwrap().rsplit('/').next().unwrap();
+    for (union, place, tag) in [("WaveGenerator", "/drive/wave_generator", "kind"), ("Teeth", "/drive/teeth", "shape")]
+    {
+        for variant in schemas[union]["oneOf"].as_array().unwrap() {
+            let name = variant["$ref"].as_str().unwrap().rsplit('/').next().unwrap();
+            let word = &schemas[name]["properties"][tag]["enum"][0];
             let fields = schemas[name]["properties"].as_object().unwrap().keys();
             let lengths = fields.filter(|field| !apart.contains(&field.as_str()));
             let base = with(&json!({ "drive": {}, "load": { "output_torque_nm": 20.0 } }), place, json!({ tag: word }));

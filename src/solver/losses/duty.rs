@@ -1,4 +1,4 @@
-//! What friction takes over several loads in turn (docs/theory.md section 10.5): what may be averaged over them, and how.
+//! What friction takes over several loads in turn (docs/explanation/theory.md section 10.5): what may be averaged over them, and how.
 //!
 //! | quantity | over the points of a duty |
 //! |---|---|
