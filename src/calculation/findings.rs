@@ -62,6 +62,8 @@ pub(crate) struct Causes {
     pub(crate) ring_equidistant: bool,
     /// Whether the wave generator moves on under its teeth.
     pub(crate) wave_generator_moves: bool,
+    /// Fields of the document that open or close gaps.
+    pub(crate) gap_fields: &'static [&'static str],
 }
 
 impl FindingAnswer {
@@ -247,6 +249,25 @@ impl Text {
                 "under the load the wave generator turns by more than a tenth of the period: the teeth then stand elsewhere than the model, which takes lever arms and directions from the drive without load, has them",
                 "lower the torque, close the clearances, or let the wave generator move, by `virtual_work`",
             ),
+            Code::NegativeBacklash => {
+                let (unit, detail) = if finding.contact.is_some() {
+                    (
+                        "µm",
+                        "a tooth has no space between wave generator and ring on a lobe or in a valley: the parts interfere",
+                    )
+                } else {
+                    (
+                        "arcmin",
+                        "at some input angle the backlash is negative: without load the parts interfere on both flanks",
+                    )
+                };
+                text(
+                    causes.gap_fields,
+                    unit,
+                    format!("{detail}, so force is needed to assemble the drive or to turn it"),
+                    "make the clearances larger or the deviations smaller",
+                )
+            }
             Code::ToothLeavesSlot => {
                 let (radius, passes, further) = if value < limit {
                     ("inner_radius_mm", "comes nearer to the axis than the walls of its slot begin", "in")

@@ -29,6 +29,7 @@ use crate::sweep::losses::{LossesAnswer, RadialForceAnswer, RollsAnswer};
 pub mod answer;
 mod arrow;
 pub mod backing;
+pub mod backlash;
 pub mod duty;
 pub mod losses;
 mod model_error;
@@ -263,11 +264,14 @@ impl Question for Sweep {
     fn is_short(checked: &CheckedSweep) -> bool {
         /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
         const FEW_STATES: u64 = 400;
-        let CheckedSweep { drive, deviations, losses, points, with_gaps, .. } = checked;
+        let CheckedSweep { drive, deviations, losses, points, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
-        // The boundary elements of a tooth take longer than any short sweep.
-        let is_plain =
-            !with_gaps && losses.is_none() && !load.parameters().ring_teeth_bend && !load.presses_corners(drive);
+        // The boundary elements of a tooth take longer than any short sweep, and so does the backlash.
+        let is_plain = !with_gaps
+            && !with_wind_up
+            && losses.is_none()
+            && !load.parameters().ring_teeth_bend
+            && !load.presses_corners(drive);
         match points {
             Points::Samples(samples) => is_plain && deviations.mesh(drive).state_count(*samples) <= FEW_STATES,
             Points::Tolerance { .. } => false,
@@ -308,8 +312,15 @@ impl Question for Sweep {
         let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
         let of_model = of_half_widths.iter().chain(&of_friction).chain(&of_projection).chain(&of_backing);
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
-        let causes = Causes { wave_generator_moves: load.parameters().wave_generator_moves, ..Causes::default() };
+        let causes = Causes {
+            wave_generator_moves: load.parameters().wave_generator_moves,
+            gap_fields: checked.gap_fields(),
+            ..Causes::default()
+        };
         findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive, causes)));
+        let backlash = with_wind_up.then(|| checked.backlash(stop));
+        let of_backlash = backlash.as_ref().and_then(findings::of_backlash);
+        findings.extend(of_backlash.map(|finding| FindingAnswer::new(&finding, drive, causes)));
         findings.extend(checked.of_document.iter().cloned());
         let unloaded_wind_up_deg = if asks_without_load {
             Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)
@@ -331,7 +342,9 @@ impl Question for Sweep {
             peaks: PerContact::of(|contact| (*sweep.peaks.get(contact)).into()),
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh(),
             loaded_teeth_per_zone: sweep.loaded_teeth(),
-            wind_up: with_wind_up.then(|| WindUpAnswer::new(drive, &sweep, unloaded_wind_up_deg)),
+            wind_up: backlash
+                .map(|backlash| WindUpAnswer::new(drive, &sweep, backlash, unloaded_wind_up_deg))
+                .transpose()?,
             torque_capacity: sweep.torque_capacity,
             duty: duty_answer,
             losses,
@@ -567,6 +580,9 @@ impl SweepAnswer {
             writeln!(writer, "transmission error, peak to peak    {error_deg:.3e} deg")?;
             if let Some(error_deg) = wind_up.unloaded_transmission_error_peak_to_peak_deg {
                 writeln!(writer, "the same without load               {error_deg:.3e} deg")?;
+            }
+            if let Some(backlash) = &wind_up.backlash {
+                backlash.write_text(writer)?;
             }
         }
         if let Some(losses) = &self.losses {

@@ -37,6 +37,18 @@ pub struct Backlash {
     pub contribution_rad: PerContact<f64>,
 }
 
+impl Backlash {
+    /// Mean in arcmin.
+    pub fn mean_arcmin(&self) -> f64 {
+        arcmin(self.mean_rad)
+    }
+
+    /// Contributions to the mean in arcmin.
+    pub fn contribution_arcmin(&self) -> PerContact<f64> {
+        PerContact::of(|contact| arcmin(*self.contribution_rad.get(contact)))
+    }
+}
+
 /// The backlash at an input angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BacklashAt {
@@ -44,6 +56,17 @@ pub struct BacklashAt {
     pub backlash_rad: f64,
     /// Where.
     pub input_angle_deg: f64,
+}
+
+impl BacklashAt {
+    /// At the carrier, in arcmin.
+    pub fn backlash_arcmin(&self) -> f64 {
+        arcmin(self.backlash_rad)
+    }
+}
+
+fn arcmin(rad: f64) -> f64 {
+    60.0 * rad.to_degrees()
 }
 
 /// The backlash of a drive with the gaps of this load, which itself counts for nothing, and these deviations.
@@ -79,8 +102,7 @@ pub struct BacklashAt {
 /// })
 /// .unwrap();
 /// let backlash = backlash::of(&drive, &load, &Deviations::default(), &Never).unwrap();
-/// let mean_arcmin = 60.0 * backlash.mean_rad.to_degrees();
-/// assert!((mean_arcmin - 6.266).abs() < 5e-4);
+/// assert!((backlash.mean_arcmin() - 6.266).abs() < 5e-4);
 /// ```
 ///
 /// # Errors

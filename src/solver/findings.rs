@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
+use crate::SolveError;
 use crate::backing::{Backing, Estimate, Shares};
+use crate::backlash::Backlash;
 use crate::cam::Hollow;
 use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
 use crate::drive::{Drive, ToothShape};
@@ -55,6 +57,9 @@ pub const SOFT_BACKING_SHARE: f64 = 0.2;
 
 /// A ball's groove, of whose depth the document says nothing, is taken to be this share of the ball's radius deep: a rule of thumb.
 pub const GROOVE_DEPTH_SHARE_OF_BALL: f64 = 0.5;
+
+/// A negative backlash closer to zero than this is rounding.
+const ROUNDING_ARCMIN: f64 = 1e-9;
 
 const STEEL: Material = Material::STEEL;
 
@@ -110,6 +115,8 @@ pub enum FindingCode {
     JohnsonBeyondHalfWidth,
     /// A wind-up so large that the teeth no longer stand where the model has them.
     WindUpBeyondModel,
+    /// Without load the parts interfere on both flanks: the backlash is below zero.
+    NegativeBacklash,
     /// A tooth's centre passes the end of its slot's walls, as the carrier is made.
     ToothLeavesSlot,
     /// A wall of a part as it is made is thin.
@@ -276,6 +283,25 @@ pub fn of_wind_up(drive: &Drive, load: &LoadCase, sweep: &Sweep) -> Option<Findi
         WIND_UP_SHARE_OF_PERIOD * Mesh::new(drive).period_deg()
     };
     (wind_up_deg > limit_deg).then_some(Finding::warning(Code::WindUpBeyondModel, wind_up_deg, limit_deg))
+}
+
+/// Interference on both flanks without load. Where a tooth is blocked on a lobe or in a valley, the finding names the
+/// ring, and its value is the gap in µm instead of the backlash in arcmin.
+pub fn of_backlash(backlash: &Result<Backlash, SolveError>) -> Option<Finding> {
+    match *backlash {
+        Ok(Backlash { smallest, .. }) => {
+            let smallest_arcmin = smallest.backlash_arcmin();
+            (smallest_arcmin < -ROUNDING_ARCMIN).then_some(Finding::warning(
+                Code::NegativeBacklash,
+                smallest_arcmin,
+                0.0,
+            ))
+        }
+        Err(SolveError::Interference { gap_um, .. }) => {
+            Some(Finding::warning(Code::NegativeBacklash, gap_um, 0.0).at(Contact::Ring))
+        }
+        Err(_) => None,
+    }
 }
 
 /// How far first order holds for the friction of a sweep with this mean loss ratio (docs/explanation/theory.md section 10.6).

@@ -68,6 +68,7 @@ pub(crate) struct Evaluator {
     takes_sweep: bool,
     takes_losses: bool,
     takes_radial_forces: bool,
+    takes_backlash: bool,
     limits: Limits,
 }
 
@@ -79,6 +80,7 @@ impl Evaluator {
             takes_sweep: quantities.iter().any(|quantity| quantity.takes != Takes::Drive),
             takes_losses: takes(Takes::Losses),
             takes_radial_forces: takes(Takes::RadialForces),
+            takes_backlash: takes(Takes::Backlash),
             quantities,
             limits,
         }
@@ -114,13 +116,14 @@ impl Evaluator {
         takes_columns: bool,
         stop: &dyn Stop,
     ) -> Result<Loaded<'a>, NoAnswer> {
+        let backlash = self.takes_backlash.then(|| checked.backlash(stop)).transpose()?;
         if !takes_columns {
-            return Ok(Loaded { checked, peaks: checked.peaks(stop)?, losses: None, radial_forces: None });
+            return Ok(Loaded { checked, peaks: checked.peaks(stop)?, losses: None, radial_forces: None, backlash });
         }
         let sweep = checked.solve(stop)?;
         let losses = if self.takes_losses { checked.loss_totals(&sweep, stop)? } else { None };
         let radial_forces = if self.takes_radial_forces { checked.radial_forces(&sweep, stop)? } else { None };
-        Ok(Loaded { checked, peaks: (&sweep).into(), losses, radial_forces })
+        Ok(Loaded { checked, peaks: (&sweep).into(), losses, radial_forces, backlash })
     }
 
     /// Outer radius of the ring as it is drawn (docs/explanation/theory.md section 8). An impossible ring has no outer diameter.

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use toothwave_calculation::sweep::CheckedSweep;
+use toothwave_solver::backlash::Backlash;
 use toothwave_solver::losses::duty::LossTotals;
 use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::mesh::Mesh;
@@ -56,6 +57,8 @@ pub(crate) enum Takes {
     RadialForces,
     /// Losses by friction, state by state.
     Losses,
+    /// Backlash at the output.
+    Backlash,
 }
 
 /// Function that computes a quantity.
@@ -123,6 +126,7 @@ pub(crate) struct Loaded<'a> {
     /// Over all points of a duty; the rest is of its hardest.
     pub(crate) losses: Option<LossTotals>,
     pub(crate) radial_forces: Option<RadialForces>,
+    pub(crate) backlash: Option<Backlash>,
 }
 
 impl Variant<'_> {
@@ -148,6 +152,10 @@ impl Variant<'_> {
 
     fn losses(&self, of: impl Fn(&LossTotals) -> f64) -> f64 {
         self.loaded(|loaded| loaded.losses.as_ref().map_or(f64::NAN, &of))
+    }
+
+    fn backlash(&self, of: impl Fn(&Backlash) -> f64) -> f64 {
+        self.loaded(|loaded| loaded.backlash.as_ref().map_or(f64::NAN, &of))
     }
 
     fn pressure_velocity(&self, contact: Contact) -> f64 {
@@ -201,6 +209,10 @@ const fn of_capacity(name: &'static str, meaning: &'static str, source: Source, 
     Quantity { needs: Needs::AllowableStress, ..of_sweep(name, "N·m", meaning, source, of) }
 }
 
+const fn backlash(name: &'static str, meaning: &'static str, pointer: &'static str, of: Of) -> Quantity {
+    of_sweep(name, "arcmin", meaning, sweep(pointer), of).taking(Takes::Backlash)
+}
+
 const fn of_losses(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
     Quantity { needs: Needs::Friction, takes: Takes::Losses, ..of_sweep(name, unit, meaning, source, of) }
 }
@@ -234,7 +246,7 @@ pub(crate) const TRANSMISSION_RATIO: &str = "transmission_ratio";
 pub(crate) const OUTER_DIAMETER_MM: &str = "outer_diameter_mm";
 
 /// All quantities, in the order in which they are listed.
-pub static QUANTITIES: [Quantity; 56] = [
+pub static QUANTITIES: [Quantity; 59] = [
     of_drive(
         TRANSMISSION_RATIO,
         "",
@@ -539,6 +551,24 @@ pub static QUANTITIES: [Quantity; 56] = [
         "Peak-to-peak range of the wind-up over the period, at the output.",
         sweep("/wind_up/transmission_error_peak_to_peak_deg"),
         |variant| Ok(variant.loaded(|loaded| loaded.peaks.transmission_error_peak_to_peak_deg(variant.drive))),
+    ),
+    backlash(
+        "backlash_mean_arcmin",
+        "Mean backlash at the output over the input angle, without load.",
+        "/wind_up/backlash/mean_arcmin",
+        |variant| Ok(variant.backlash(Backlash::mean_arcmin)),
+    ),
+    backlash(
+        "backlash_min_arcmin",
+        "Smallest backlash at the output over the input angle. Parts interfere if it is below 0.",
+        "/wind_up/backlash/smallest_arcmin",
+        |variant| Ok(variant.backlash(|backlash| backlash.smallest.backlash_arcmin())),
+    ),
+    backlash(
+        "backlash_max_arcmin",
+        "Largest backlash at the output over the input angle.",
+        "/wind_up/backlash/largest_arcmin",
+        |variant| Ok(variant.backlash(|backlash| backlash.largest.backlash_arcmin())),
     ),
     of_sweep(
         "radial_force_max_n",

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::asking::{ENDPOINTS, Service};
+use crate::backlash::jammed;
 use crate::codes::{codes_of, finding_codes, words};
 use crate::designs::{bored, of_the_paper, shortest, spelled_out, undercut, with, without};
 
@@ -598,8 +599,10 @@ async fn every_finding_occurs_over_http() {
     let steep_projection = with(&undercut(), "/model", of_the_paper());
     let old = with(&shortest(), "/model", json!({ "clearance": { "ring_um": 3.0 } }));
     let twice = with(&old, "/modification", json!({ "ring_equidistant_um": 3.0 }));
-    for document in
-        [linear, brass, wide, loose(), rubbing(0.03), rubbing(0.2), limited(json!(500.0)), gap, steep_projection, twice]
+    let rubbing = [rubbing(0.03), rubbing(0.2)];
+    for document in [linear, brass, wide, loose(), limited(json!(500.0)), gap, steep_projection, twice, jammed()]
+        .into_iter()
+        .chain(rubbing)
     {
         all.extend(findings(&document).await);
     }

@@ -7,6 +7,7 @@
 
 mod accuracy;
 mod asking;
+mod backlash;
 mod batch;
 mod caching;
 mod codes;

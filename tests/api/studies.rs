@@ -363,6 +363,7 @@ async fn every_quantity_names_unit_and_meaning() {
             "N·m" => "_nm",
             "mm" => "_mm",
             "deg" => "_deg",
+            "arcmin" => "_arcmin",
             "MPa" => "_mpa",
             "N" => "_n",
             "W" => "_w",

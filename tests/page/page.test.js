@@ -1137,6 +1137,7 @@ const OTHER_REPORTS = {
   },
   stress_above_allowable: { drive: CASE_5_1, load: { input_torque_nm: 20, allowable_stress_mpa: 500 } },
   wind_up_beyond_model: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: VIRTUAL_WORK, parts: { carrier: { clearance_um: 1000 } } },
+  negative_backlash: { drive: CASE_5_1, load: { input_torque_nm: 20 }, sweep: { wind_up: true }, deviations: { slot_angle_arcsec: Array.from({ length: 28 }, (_, slot) => (slot === 3 ? 30 : 0)) } },
 };
 
 async function pagesOfReport() {

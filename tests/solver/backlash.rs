@@ -8,7 +8,7 @@ use toothwave_solver::gaps::{Runout, TipRelief};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::{
     Compatibility, Contact, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Modification, Never,
-    PerContact, SolveError, ToothShape, WaveGenerator,
+    PerContact, SolveError, ToothShape, WaveGenerator, findings,
 };
 
 use crate::deviations::{ALL_KINDS, deviations, drives};
@@ -524,4 +524,24 @@ fn rigid_bodies_turned_until_they_touch_agree() {
     }
     // The error over the gap halves with the gap.
     assert!(worst[0] < 1e-2 && worst[1] < 0.56, "{worst:?}");
+}
+
+#[test]
+fn only_negative_backlash_is_a_finding() {
+    let of_backlash = |clearance_um, slot_angle: f64, tooth_radius: f64| {
+        let list = |value: f64| (0..28).map(|item| if item == 3 { value } else { 0.0 }).collect();
+        let deviations = Deviations {
+            slot_angle_arcsec: list(slot_angle),
+            tooth_radius_um: list(tooth_radius),
+            ..Deviations::default()
+        };
+        let found = of(&PAPER_5_1, &with_clearance(everywhere(clearance_um)), &deviations);
+        findings::of_backlash(&found)
+    };
+    assert_eq!(of_backlash(0.0, 0.0, 0.0), None);
+    assert_eq!(of_backlash(10.0, 30.0, 0.0), None);
+    let jammed = of_backlash(0.0, 30.0, 0.0).unwrap();
+    assert!((jammed.value + 0.5).abs() < 1e-9 && jammed.contact.is_none(), "{jammed:?}");
+    let blocked = of_backlash(5.0, 0.0, -6.0).unwrap();
+    assert!((blocked.value + 2.0).abs() < 1e-6 && blocked.contact == Some(Contact::Ring), "{blocked:?}");
 }

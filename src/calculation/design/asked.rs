@@ -23,7 +23,7 @@ pub struct SweepDocument {
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-12, maximum = 0.1, nullable = false)]
     pub tolerance: Option<f64>,
-    /// True if the answer includes wind-up and torsional stiffness. Default: false.
+    /// True if the answer includes wind-up, torsional stiffness and backlash. Default: false.
     #[serde(default)]
     #[schema(default = false)]
     pub wind_up: bool,

@@ -1,17 +1,19 @@
 //! Answer of a sweep.
 
 use serde::Serialize;
-use toothwave_solver::Drive;
 pub use toothwave_solver::PerContact;
+use toothwave_solver::backlash::Backlash;
 pub use toothwave_solver::mesh::TeethInMesh;
 pub use toothwave_solver::model_error::ModelError;
 pub use toothwave_solver::sweep::TorqueCapacity;
 use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, Peak, States};
+use toothwave_solver::{Drive, SolveError};
 use utoipa::ToSchema;
 
 use crate::design::ModelDocument;
 use crate::findings::FindingAnswer;
 use crate::sweep::backing::EstimateAnswer;
+use crate::sweep::backlash::BacklashAnswer;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 
@@ -44,7 +46,7 @@ pub struct SweepAnswer {
     pub loaded_teeth_per_zone: TeethInMesh,
     /// The states.
     pub states: StatesAnswer,
-    /// Wind-up and torsional stiffness, with `sweep.wind_up`.
+    /// Wind-up, torsional stiffness and backlash, with `sweep.wind_up`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wind_up: Option<WindUpAnswer>,
@@ -154,6 +156,10 @@ pub struct StatesAnswer {
 /// Quantities of all teeth together, in columns of equal length with one entry for each input angle.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct WindUpAnswer {
+    /// Backlash at the output, without load. Absent if a tooth has no space on a lobe or in a valley.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub backlash: Option<BacklashAnswer>,
     /// Transmission error, peak to peak: range of the wind-up over the period, at the output, in deg.
     pub transmission_error_peak_to_peak_deg: f64,
     /// Transmission error without load, peak to peak, in deg. Only with gaps.
@@ -175,14 +181,20 @@ pub struct WindUpAnswer {
 }
 
 impl WindUpAnswer {
-    pub(super) fn new(drive: &Drive, sweep: &solver::Sweep, unloaded_wind_up_deg: Option<Vec<f64>>) -> Self {
+    pub(super) fn new(
+        drive: &Drive,
+        sweep: &solver::Sweep,
+        backlash: Result<Backlash, SolveError>,
+        unloaded_wind_up_deg: Option<Vec<f64>>,
+    ) -> Result<Self, SolveError> {
         let unloaded_peak_to_peak_deg = unloaded_wind_up_deg.as_ref().map(|column| {
             let Extremes { least, largest } = Extremes::of(column);
             (largest - least) / drive.teeth_per_wave()
         });
         let InputAngles { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth } =
             sweep.input_angles.clone();
-        Self {
+        Ok(Self {
+            backlash: BacklashAnswer::of(backlash)?,
             transmission_error_peak_to_peak_deg: sweep.transmission_error_peak_to_peak_deg(drive),
             unloaded_transmission_error_peak_to_peak_deg: unloaded_peak_to_peak_deg,
             input_angle_deg,
@@ -190,7 +202,7 @@ impl WindUpAnswer {
             unloaded_wind_up_deg,
             torsional_stiffness_nm_per_rad,
             loaded_teeth,
-        }
+        })
     }
 }
 

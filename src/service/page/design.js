@@ -538,7 +538,7 @@ export const GROUPS = [
           { key: 'tolerance', label: 'where the true peaks need them', preset: 1e-6, field: number('/sweep/tolerance', 'Relative tolerance', 'τ', '') },
         ],
       },
-      flag('/sweep/wind_up', 'Wind-up and torsional stiffness too'),
+      flag('/sweep/wind_up', 'Wind-up, torsional stiffness and backlash too'),
       number('/profile/chord_tolerance_mm', 'Chord tolerance', 't', 'mm', { preset: 0.001, step: 0.001 }),
       choice('/profile/extent', 'Exported ring profile', [
         { value: 'tooth', label: 'One tooth' },

@@ -87,6 +87,12 @@ const KINDS = {
     why: 'Lever arms and directions are those of the drive without load; a wind-up of one period moves every tooth on by a whole spacing.',
     change: 'A torque that suits the drive, or clearances that do.',
   },
+  negative_backlash: {
+    title: 'Interference of both flanks',
+    tests: 'The least backlash at the output over the input angle, parts taken as rigid, against zero.',
+    basis: ['exact', 'To first order in the gaps.'],
+    why: 'Teeth on both flanks are pressed before any load: the drive turns only by force, or cannot be assembled.',
+  },
   tooth_leaves_slot: {
     title: 'Tooth leaves its slot',
     tests: 'How far the teeth’s centres go, against where the drawn carrier’s slot walls end.',

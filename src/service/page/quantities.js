@@ -5,7 +5,7 @@ import { number, withUnit } from './format.js';
 import { getJson } from './service.js';
 
 /** How names end in units; the longest first. */
-const UNIT_ENDINGS = /_(nm_per_rad|mpa_m_per_s|mm|deg|mpa|nm|um|n|w)$/;
+const UNIT_ENDINGS = /_(nm_per_rad|mpa_m_per_s|arcmin|mm|deg|mpa|nm|um|n|w)$/;
 
 const PHRASES = [
   [/^carrier_finger_share$/, 'finger deflection over contact deflection'],
@@ -14,6 +14,7 @@ const PHRASES = [
   [/_over_/, ' over '],
   [/_(min|least)$/, ', least'],
   [/_(max|largest)$/, ', largest'],
+  [/_mean$/, ', mean'],
   [/_peak_to_peak$/, ', peak to peak'],
   [/^(.+)_back_driven$/, '$1, back-driven'],
   [/^efficiency_(.+)_fixed/, 'efficiency, $1 fixed'],

@@ -137,6 +137,23 @@ const backingRows = Object.entries(BACKINGS).map(([key, label]) => {
   });
 });
 
+const backlashOf = ({ sweep }) => sweep?.wind_up?.backlash;
+const backlashRow = (label, get) => row(label, '', 'arcmin', (answers) => backlashOf(answers) && get(backlashOf(answers)), { significant: 4 });
+
+const backlashRows = [
+  backlashRow('Mean backlash of the output', ({ mean_arcmin: mean }) => mean),
+  backlashRow('Least backlash of the output', ({ smallest_arcmin: smallest }) => smallest),
+  backlashRow('Most backlash of the output', ({ largest_arcmin: largest }) => largest),
+  ...CONTACTS.map(({ key, name }) => backlashRow(`Contribution to the mean backlash, ${name.toLowerCase()}`, ({ contribution_arcmin: part }) => part[key])),
+];
+
+const backlashTile = {
+  ...backlashRow('Mean backlash', ({ mean_arcmin: mean }) => mean),
+  note: (answers) => `${number(backlashOf(answers).smallest_arcmin, 4)} to ${number(backlashOf(answers).largest_arcmin, 4)} arcmin, unloaded`,
+  state: (answers) => (backlashOf(answers).smallest_arcmin < -1e-9 ? 'warning' : ''),
+  isOptional: true,
+};
+
 /** Always in sight, however far one scrolls. */
 const KEY_ROWS = [
   row('Ratio, ring fixed', '', '', ({ geometry }) => geometry?.transmission_ratio),
@@ -155,6 +172,7 @@ const KEY_ROWS = [
     note: ({ sweep: { losses } }) => (losses.self_locking ? 'ring fixed; locks itself' : `ring fixed; ${number(100 * losses.efficiency.ring_fixed_back_driven, 3)} % from behind`),
     isOptional: true,
   }),
+  backlashTile,
   row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
     text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
     note: ({ geometry: { undercut } }) =>
@@ -195,6 +213,7 @@ export const GROUPS = [
       row('Least torsional stiffness of the output, N·m/rad', '', '', ({ sweep }) => least(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
       row('Most torsional stiffness of the output, N·m/rad', '', '', ({ sweep }) => greatest(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
       row('Transmission error, peak to peak', '', 'deg', ({ sweep }) => sweep?.wind_up?.transmission_error_peak_to_peak_deg),
+      ...backlashRows,
     ],
   },
   { title: 'Friction losses and wear', offer: '/friction/wave_generator', rows: lossRows },

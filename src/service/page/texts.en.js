@@ -66,7 +66,7 @@ const FIELDS = {
   '/sweep': 'At which input angles the forces are calculated.',
   '/sweep/samples': 'Equal steps of one period of the load.',
   '/sweep/tolerance': 'Input angles are added until every peak is known to this relative error.',
-  '/sweep/wind_up': 'Calculates how far the wave generator winds up under the load, and the torsional stiffness.',
+  '/sweep/wind_up': 'Calculates how far the wave generator winds up under the load, the torsional stiffness and the backlash.',
   '/profile/chord_tolerance_mm': 'Largest distance between a drawn chord and the true curve.',
   '/profile/extent': 'How much of the ring the exported points cover.',
 };
