@@ -1007,7 +1007,6 @@ fn modifications_and_unlike_zones_take_fast_path() {
 fn every_wave_generator_takes_fast_path() {
     for wave_generator in [
         WaveGenerator::Eccentric { radius_mm: 57.0, eccentricity_mm: 1.0 },
-        WaveGenerator::Harmonic { lobes: 1, mean_radius_mm: 57.0, amplitude_mm: 1.0 },
         WaveGenerator::Harmonic { lobes: 2, mean_radius_mm: 57.0, amplitude_mm: 1.0 },
         WaveGenerator::Harmonic { lobes: 7, mean_radius_mm: 57.0, amplitude_mm: 0.3 },
         WaveGenerator::HarmonicPath { lobes: 2, mean_path_radius_mm: 62.0, amplitude_mm: 1.0 },
