@@ -36,7 +36,8 @@ fn written_defaults_are_the_same_base() {
     let [base, ..] = examples();
     let modulus = "/materials/ring/youngs_modulus_gpa";
     let uniform = json!({ "distribution": "uniform", "limit": 1.0 });
-    let written = with(&with(&base, modulus, json!(210.0)), "/model", json!({}));
+    let written =
+        with(&with(&base, "/materials", json!({ "ring": { "youngs_modulus_gpa": 210.0 } })), "/model", json!({}));
     let short = with(&base, "/model", json!({}));
     let with_deviations =
         with(&written, "/deviations", json!({ "slot_wall_um": [], "ring_runout": { "amount_um": 0 } }));

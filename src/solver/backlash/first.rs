@@ -203,5 +203,5 @@ fn least(values: &[f64]) -> usize {
 pub(super) fn vertex([before, middle, behind]: [f64; 3]) -> Option<(f64, f64)> {
     let bend = before - 2.0 * middle + behind;
     let place = 0.5 * (before - behind) / bend;
-    (bend > 0.0 && place.abs() < 1.0).then(|| (place, middle - 0.25 * (before - behind) * place))
+    (bend > 0.0 && place.abs() < 1.0).then_some((place, middle - 0.25 * (before - behind) * place))
 }
