@@ -292,7 +292,7 @@ async fn arcs_are_true_to_flank_and_cam() {
             let document = with(&design, "/profile", json!({ "chord_tolerance_mm": tolerance_mm, "extent": "tooth" }));
             let number = |pointer: &str| document.pointer(pointer).unwrap().as_f64().unwrap();
             let ring = arcs(&pairs("ring", &document).await);
-            let of_space = ring.len() / document["drive"]["ring"]["teeth"].as_u64().unwrap() as usize;
+            let of_space = ring.len() / usize::try_from(document["drive"]["ring"]["teeth"].as_u64().unwrap()).unwrap();
             let flank = geometry(&document).await.flank(4000);
             let off_mm = farthest(&ring[..of_space], flank);
             assert!(off_mm <= tolerance_mm, "flank: {off_mm} mm, tolerance {tolerance_mm} mm");

@@ -258,6 +258,7 @@ pub(crate) fn note(found: &mut (f64, f64), error: f64) {
 }
 
 /// A row of the table, errors rounded outward to whole hundredths.
+#[expect(clippy::cast_possible_truncation, reason = "some per cent")]
 fn row(load: &LoadParameters, case: model_error::Case, found: &Found) -> String {
     let LoadParameters { compatibility, law, ring_teeth_bend, wave_generator_moves, corner_contact, .. } = load;
     let refined = [ring_teeth_bend, wave_generator_moves, corner_contact];
