@@ -87,9 +87,9 @@ test('ellipse changes to kinds of equal size and back', async () => {
   await pick(page, WAVE_GENERATOR, 'eccentric');
   assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'eccentric', radius_mm: 57, eccentricity_mm: 1 });
   await pick(page, WAVE_GENERATOR, 'harmonic');
-  assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'harmonic', lobes: 1, mean_radius_mm: 57, amplitude_mm: 1 });
+  assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'harmonic', lobes: 2, mean_radius_mm: 57, amplitude_mm: 1 });
   await pick(page, WAVE_GENERATOR, 'harmonic_path');
-  assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'harmonic_path', lobes: 1, amplitude_mm: 1, mean_path_radius_mm: 62 });
+  assert.deepEqual((await designOf(page)).drive.wave_generator, { kind: 'harmonic_path', lobes: 2, amplitude_mm: 1, mean_path_radius_mm: 62 });
   await pick(page, WAVE_GENERATOR, 'ellipse');
   const { drive } = await designOf(page);
   assert.deepEqual([drive.wave_generator, drive.ring.teeth], [{ semi_major_mm: 58, semi_minor_mm: 56 }, 26]);
