@@ -10,6 +10,7 @@ use pyo3::types::PyBytes;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::drawing::preset::Preset;
 use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::json;
@@ -64,16 +65,17 @@ pub(crate) fn ask(py: Python<'_>, question: &str, document: &[u8]) -> PyResult<A
     fn asked<Q: Question<Answer: Send + Sync>>(question: Q, document: &[u8]) -> Result<Answer, NoAnswer> {
         question.ask(document, &Limits::OFFLINE, &toothwave_calculation::question::Never).map(Answer::new)
     }
+    let drawn = |part, document| asked(Drawing { part, preset: Preset::Document }, document);
     let answer = py.detach(|| {
         Some(match question {
             "sweep" => asked(Sweep, document),
             "geometry" => asked(Geometry, document),
             "coincidence_degree" => asked(CoincidenceDegree, document),
-            "ring" => asked(Drawing(DrawnPart::Ring), document),
-            "wave_generator" => asked(Drawing(DrawnPart::WaveGenerator), document),
-            "carrier" => asked(Drawing(DrawnPart::Carrier), document),
-            "tooth" => asked(Drawing(DrawnPart::Tooth), document),
-            "assembly" => asked(Drawing(DrawnPart::Assembly), document),
+            "ring" => drawn(DrawnPart::Ring, document),
+            "wave_generator" => drawn(DrawnPart::WaveGenerator, document),
+            "carrier" => drawn(DrawnPart::Carrier, document),
+            "tooth" => drawn(DrawnPart::Tooth, document),
+            "assembly" => drawn(DrawnPart::Assembly, document),
             _ => return None,
         })
     });
