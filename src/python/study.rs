@@ -13,6 +13,9 @@ use crate::answer::{Answer, format_of};
 use crate::column::Column;
 use crate::{PartError, raised};
 
+/// The columns of a table, each with its name.
+type Columns<'py> = Vec<(String, Bound<'py, PyAny>)>;
+
 /// A study that was read and checked.
 #[pyclass(frozen, module = "toothwave._native")]
 pub struct Study(Arc<engine::Study>);
@@ -104,12 +107,12 @@ impl Gathered {
     }
 
     /// The columns of the answer's table.
-    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Columns<'py>> {
         arrays(py, py.detach(|| self.gathered.lock().answer().columns()))
     }
 
     /// The columns of the rows, one a variant; nothing of a search.
-    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<(String, Bound<'py, PyAny>)>>> {
+    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Option<Columns<'py>>> {
         py.detach(|| self.gathered.lock().rows_columns()).map(|columns| arrays(py, columns)).transpose()
     }
 
