@@ -1083,7 +1083,7 @@ const LONG_REPORTS = [
   {
     drive: { wave_generator: { semi_major_mm: 58, semi_minor_mm: 46 }, teeth: { radius_mm: 4, width_mm: 2, count: 28, installed: 14 }, ring: { teeth: 30, tip_radius_mm: 57.23 } },
     load: { input_torque_nm: 200, allowable_stress_mpa: 1500 },
-    model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } },
+    model: { compatibility: 'virtual_work', stiffness: { law: 'palmgren' }, refinements: 'none' },
     materials: NO_STEEL,
     sweep: { wind_up: true },
     parts: PARTS,

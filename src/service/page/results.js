@@ -144,7 +144,7 @@ const backlashRows = [
   backlashRow('Mean backlash of the output', ({ mean_arcmin: mean }) => mean),
   backlashRow('Least backlash of the output', ({ smallest_arcmin: smallest }) => smallest),
   backlashRow('Most backlash of the output', ({ largest_arcmin: largest }) => largest),
-  ...CONTACTS.map(({ key, name }) => backlashRow(`Contribution to the mean backlash, ${name.toLowerCase()}`, ({ contribution_arcmin: part }) => part[key])),
+  ...CONTACTS.map(({ key, name }) => backlashRow(`Backlash by ${name.toLowerCase()}`, ({ contribution_arcmin: part }) => part[key])),
 ];
 
 const backlashTile = {
