@@ -1,5 +1,5 @@
-//! Backlash at the output: how far the carrier turns from one flank to the other, wave generator and ring held, without
-//! load (docs/explanation/theory.md section 4.11).
+//! Output backlash: unloaded rotation of the carrier between opposite flanks, with wave generator and ring held
+//! (docs/explanation/theory.md section 4.11).
 
 use crate::cam::ToothCenter;
 use crate::contact::PerContact;
@@ -17,49 +17,49 @@ mod pair;
 use first::FirstTeeth;
 use pair::Pair;
 
-/// What of a lap is left out at either end of a piece: there a tooth stands on a lobe or in a valley, where it has no
-/// arm, and limits are taken.
+/// Fraction of a lap left out at both ends of a piece. A tooth on a lobe or in a valley there has no lever arm, so
+/// limits are used.
 const MARGIN: f64 = 1e-9;
 
-/// Intervals of a piece, an even number: two make a cell.
+/// Number of intervals in a piece. It is even because each cell has two.
 const INTERVALS: usize = 32;
 
-/// The backlash over the input angle, at the carrier.
+/// Backlash of the carrier over the input angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Backlash {
-    /// Its mean.
+    /// Mean backlash.
     pub mean_rad: f64,
-    /// Its least value; below zero parts interfere.
+    /// Smallest backlash; parts interfere if it is negative.
     pub smallest: BacklashAt,
-    /// Its largest value.
+    /// Largest backlash.
     pub largest: BacklashAt,
-    /// What the gaps of each contact contribute to the mean; they add up to it.
+    /// Contribution of each contact's gaps to the mean; the contributions add up to it.
     pub contribution_rad: PerContact<f64>,
 }
 
 impl Backlash {
-    /// Mean in arcmin.
+    /// Returns the mean in arcmin.
     pub fn mean_arcmin(&self) -> f64 {
         arcmin(self.mean_rad)
     }
 
-    /// Contributions to the mean in arcmin.
+    /// Returns the contributions to the mean in arcmin.
     pub fn contribution_arcmin(&self) -> PerContact<f64> {
         PerContact::of(|contact| arcmin(*self.contribution_rad.get(contact)))
     }
 }
 
-/// The backlash at an input angle.
+/// Backlash at one input angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BacklashAt {
-    /// At the carrier.
+    /// Backlash of the carrier.
     pub backlash_rad: f64,
-    /// Where.
+    /// Input angle of this backlash.
     pub input_angle_deg: f64,
 }
 
 impl BacklashAt {
-    /// At the carrier, in arcmin.
+    /// Returns the backlash of the carrier in arcmin.
     pub fn backlash_arcmin(&self) -> f64 {
         arcmin(self.backlash_rad)
     }
@@ -69,7 +69,7 @@ fn arcmin(rad: f64) -> f64 {
     60.0 * rad.to_degrees()
 }
 
-/// The backlash of a drive with the gaps of this load, which itself counts for nothing, and these deviations.
+/// Returns the backlash of a drive with these deviations and the gaps of this load case. The torque has no effect.
 ///
 /// ```
 /// use toothwave_solver::{backlash, Compatibility, ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Material};
@@ -106,9 +106,9 @@ fn arcmin(rad: f64) -> f64 {
 /// ```
 ///
 /// # Errors
-/// [`SolveError::NoToothInMesh`] where at some input angle no flank is touched, [`SolveError::Interference`] where a
-/// tooth cannot pass a lobe or a valley, [`SolveError::Impossible`] for deviations or a modification that the drive
-/// cannot have.
+/// [`SolveError::NoToothInMesh`] if no flank is touched at some input angle, [`SolveError::Interference`] if a tooth
+/// cannot pass a lobe or a valley, [`SolveError::Impossible`] for deviations or a modification that the drive cannot
+/// have.
 pub fn of(drive: &Drive, load: &LoadCase, deviations: &Deviations, stop: &dyn Stop) -> Result<Backlash, SolveError> {
     let mirrored = mirrored(deviations);
     let flanks = Flanks::new(drive, load, deviations, &mirrored)?;
@@ -134,10 +134,10 @@ pub fn of(drive: &Drive, load: &LoadCase, deviations: &Deviations, stop: &dyn St
     })
 }
 
-/// What the gaps of each contact contribute to the backlash at an input angle; together they are the backlash there.
+/// Returns the contribution of each contact's gaps to the backlash at an input angle. Their sum is the backlash there.
 ///
 /// # Errors
-/// As [`of`], but for interference.
+/// The errors of [`of`], except interference.
 pub fn at(
     drive: &Drive,
     load: &LoadCase,
@@ -169,7 +169,7 @@ fn sum(of_contacts: &PerContact<f64>) -> f64 {
     of_contacts.iter().map(|(_, value)| value).sum()
 }
 
-/// The deviations of the mirrored drive, of which the teeth in front are those behind the lobes of this one.
+/// Returns the deviations of the mirrored drive. Its front flanks are the flanks of this drive behind the lobes.
 fn mirrored(deviations: &Deviations) -> Deviations {
     let list = |list: &[f64], sign: f64| {
         let turned = list.iter().take(1).chain(list.iter().skip(1).rev());
@@ -187,12 +187,12 @@ fn mirrored(deviations: &Deviations) -> Deviations {
     }
 }
 
-/// The flanks on either side of the lobes.
+/// Side of the lobes on which the flanks are.
 #[derive(Debug, Clone, Copy)]
 enum Side {
-    /// Those that carry where the load holds the wave generator back.
+    /// Flanks that carry if the load holds the wave generator back.
     Front,
-    /// The others, which are the front ones of the mirrored drive at the whole repeat less the input angle.
+    /// Opposite flanks: the front flanks of the mirrored drive at the full repeat minus the input angle.
     Behind,
 }
 
@@ -211,7 +211,7 @@ impl Side {
         }
     }
 
-    /// One of so many things in a row.
+    /// Returns the index on this side of an item in a row of `count`.
     const fn index(self, index: usize, count: usize) -> usize {
         match self {
             Self::Front => index,
@@ -220,34 +220,34 @@ impl Side {
     }
 }
 
-/// A tooth on one side during a lap.
+/// One tooth on one side during a lap.
 #[derive(Debug, Clone, Copy)]
 struct Tooth {
-    /// Spacings from its lobe at the start of the lap.
+    /// Distance from its lobe at the start of the lap, in tooth spacings.
     spacings: u64,
     place: Place,
 }
 
-/// What a gap at each contact of a tooth closes by, and where the tooth stands.
+/// Conversion of a tooth's gaps to carrier rotation, and the tooth's position.
 #[derive(Debug, Clone, Copy)]
 struct Lever {
     center: ToothCenter,
     flank: FlankPoint,
-    /// Turn of the carrier for each mm.
+    /// Rotation of the carrier per millimetre of gap.
     rad_per_mm: PerContact<f64>,
 }
 
-/// A stretch of every lap in which no tooth enters or leaves.
+/// Part of every lap in which no tooth enters or leaves the mesh.
 struct Piece {
     nodes: Vec<f64>,
-    /// Of each node the levers, by spacings from 1 on.
+    /// Levers at each node, by spacings from 1 on.
     levers: Vec<Vec<Lever>>,
 }
 
-/// What was seen so far.
+/// Results of the laps evaluated so far.
 struct Found {
     integral_rad: PerContact<f64>,
-    /// Laps passed, and the backlash there.
+    /// Laps passed, and the backlash at that point.
     smallest: (f64, f64),
     largest: (f64, f64),
 }
@@ -273,7 +273,7 @@ struct Flanks<'a> {
     mesh: Mesh,
     laps: u64,
     front: Gaps<'a>,
-    /// Of the mirrored drive.
+    /// Gaps of the mirrored drive.
     behind: Gaps<'a>,
 }
 
@@ -302,7 +302,7 @@ impl<'a> Flanks<'a> {
         Ok(Self {
             drive,
             mesh,
-            // Where all items are alike so are all laps.
+            // If all items are alike, so are all laps.
             laps: if mesh.tells_items_apart() { mesh.laps() } else { 1 },
             front: Gaps::new(drive, &p.clearance_um, p.modification, Some(deviations)),
             behind: Gaps::new(drive, &p.clearance_um, of_mirrored, Some(mirrored)),
@@ -313,12 +313,12 @@ impl<'a> Flanks<'a> {
         self.mesh.sweep_period_deg() / self.mesh.laps() as f64
     }
 
-    /// Spacings from the lobe within which teeth touch the flank.
+    /// Returns the number of spacings from the lobe within which teeth touch the flank.
     fn places(&self, fraction: f64) -> u64 {
         self.mesh.whole_spacings() + u64::from(fraction > self.mesh.entry_fraction())
     }
 
-    /// Those of a side in one of its laps, up to so many spacings from their lobes.
+    /// Returns the teeth of one side in one of its laps, up to `places` spacings from their lobes.
     fn teeth(&self, lap: u64, places: u64) -> Vec<Tooth> {
         if !self.mesh.tells_items_apart() {
             return (1..=places).map(|spacings| Tooth { spacings, place: Place::default() }).collect();
@@ -357,13 +357,13 @@ impl<'a> Flanks<'a> {
         }
     }
 
-    /// Turn of the carrier by which a tooth closes its gaps, contact by contact.
+    /// Returns the carrier rotation that closes the gaps of a tooth, per contact.
     fn closing_rad(&self, side: Side, tooth: &Tooth, lever: &Lever) -> PerContact<f64> {
         let gap_mm = self.gaps(side).at(&tooth.place, &lever.center, &lever.flank);
         PerContact::of(|contact| gap_mm.get(contact) * lever.rad_per_mm.get(contact))
     }
 
-    /// The pieces of a lap, which are those of its mirror image in reverse.
+    /// Returns the pieces of a lap. Those of the mirrored lap are the same in reverse order.
     fn pieces(&self) -> Result<Vec<Piece>, NotConverged> {
         let relief = self.front.modification().ring_tip_relief;
         let relieved = relief.map(|relief| self.mesh.fraction_at_deg(relief.start_deg));
@@ -383,7 +383,7 @@ impl<'a> Flanks<'a> {
         Ok(Piece { nodes, levers })
     }
 
-    /// Adds a lap to what was found.
+    /// Adds the results of a lap to `found`.
     fn look(&self, lap: u64, pieces: &[Piece], found: &mut Found) -> Result<(), SolveError> {
         for (index, Piece { nodes, .. }) in pieces.iter().enumerate() {
             let on = |side: Side| FirstTeeth::new(self, side, lap, nodes, &pieces[side.index(index, pieces.len())]);

@@ -1,23 +1,23 @@
-//! Which tooth of one side is the first that closes its gaps.
+//! First tooth of one side to close its gaps.
 
 use super::{Flanks, INTERVALS, Lever, Piece, Side, Tooth, sum};
 use crate::SolveError;
 use crate::contact::PerContact;
 use crate::root::{NotConverged, bracketed};
 
-/// Stretches shorter than this part of a lap are not cut: what follows is rounding.
+/// Shortest stretch that is cut, as a fraction of a lap. Shorter ones are rounding.
 const SHORTEST: f64 = 1e-12;
 
-/// A tooth that closes earlier by less than this share does so by rounding.
+/// Relative lead of one tooth over another that counts as rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// A gap nearer to nothing than this is rounding.
+/// Gap, in mm, below which a value is rounding.
 const NEGLIGIBLE_MM: f64 = 1e-12;
 
-/// A tooth nearer to a lobe or a valley than this share of half a lobe is on it.
+/// Distance from a lobe or a valley at which a tooth counts as on it, as a fraction of half a lobe.
 const BESIDE: f64 = 1e-6;
 
-/// The tooth that is first between two fractions of a lap.
+/// Stretch between two fractions of a lap, with its first tooth.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
     pub(super) start: f64,
@@ -25,27 +25,27 @@ pub(super) struct Stretch {
     pub(super) tooth: usize,
 }
 
-/// The tooth that is first at a fraction of a lap.
+/// Fraction of a lap, with the first tooth there.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
     fraction: f64,
     tooth: usize,
 }
 
-/// The teeth of one side during a piece of a lap.
+/// Teeth of one side during a piece of a lap.
 pub(super) struct FirstTeeth<'a> {
     flanks: &'a Flanks<'a>,
     side: Side,
     nodes: &'a [f64],
     levers: &'a [Vec<Lever>],
     teeth: Vec<Tooth>,
-    /// Closing angles by node and tooth.
+    /// Closing angles, by node and tooth.
     closing_rad: Vec<Vec<f64>>,
     first: Vec<usize>,
 }
 
 impl<'a> FirstTeeth<'a> {
-    /// The nodes are those of the lap that is looked at, the piece that of the side.
+    /// Evaluates the teeth at all nodes. `nodes` are those of the current lap; `piece` is the piece of this side.
     pub(super) fn new(flanks: &'a Flanks<'a>, side: Side, lap: u64, nodes: &'a [f64], piece: &'a Piece) -> Self {
         let levers = &piece.levers;
         let places = levers.first().map_or(0, Vec::len) as u64;
@@ -78,7 +78,7 @@ impl<'a> FirstTeeth<'a> {
         self.flanks.closing_rad(self.side, tooth, self.lever(tooth, node))
     }
 
-    /// Turn of the carrier by which a tooth closes its gaps, contact by contact.
+    /// Returns the carrier rotation that closes the gaps of a tooth, per contact.
     pub(super) fn closing(&self, tooth: usize, fraction: f64) -> Result<PerContact<f64>, NotConverged> {
         let tooth = &self.teeth[tooth];
         if let Ok(node) = self.nodes.binary_search_by(|node| node.total_cmp(&fraction)) {
@@ -88,7 +88,7 @@ impl<'a> FirstTeeth<'a> {
         Ok(self.flanks.closing_rad(self.side, tooth, &lever))
     }
 
-    /// The stretches of the cell that starts at a node.
+    /// Returns the stretches of the cell that starts at a node.
     pub(super) fn stretches(&self, cell: usize) -> Result<Vec<Stretch>, NotConverged> {
         let [start, middle, end] =
             [cell, cell + 1, cell + 2].map(|node| Moment { fraction: self.nodes[node], tooth: self.first[node] });
@@ -108,7 +108,8 @@ impl<'a> FirstTeeth<'a> {
         Ok(stretches)
     }
 
-    /// Where by a parabola another tooth is first for a while within a cell at whose nodes one and the same is.
+    /// Returns the fraction at which another tooth is probably first, for a cell whose nodes share one first tooth. A
+    /// parabola through the nodes estimates it.
     fn dip(&self, cell: usize) -> Option<f64> {
         let first = self.first[cell];
         let mut lowest: Option<(f64, f64)> = None;
@@ -131,7 +132,7 @@ impl<'a> FirstTeeth<'a> {
         Ok(Moment { fraction, tooth: least(&closing_rad.collect::<Result<Vec<_>, _>>()?) })
     }
 
-    /// Cuts where another tooth becomes the first.
+    /// Splits a stretch at each change of the first tooth.
     fn cut(&self, from: Moment, to: Moment, stretches: &mut Vec<Stretch>) -> Result<(), NotConverged> {
         let mut push = |start: f64, end: f64, tooth| stretches.push(Stretch { start, end, tooth });
         if from.tooth == to.tooth || to.fraction - from.fraction < SHORTEST {
@@ -144,7 +145,7 @@ impl<'a> FirstTeeth<'a> {
         };
         let (at_start_rad, at_end_rad) = (lead_rad(from.fraction)?, lead_rad(to.fraction)?);
         if at_start_rad >= 0.0 || at_end_rad <= 0.0 {
-            // The two are one until the end, or from the start on.
+            // The two teeth are equal up to the end, or from the start on.
             let tooth = if at_start_rad >= 0.0 { to.tooth } else { from.tooth };
             push(from.fraction, to.fraction, tooth);
             return Ok(());
@@ -161,8 +162,8 @@ impl<'a> FirstTeeth<'a> {
         Ok(())
     }
 
-    /// That each tooth passes its lobe and its valley, where it has no arm to close a gap with: there a ring and a wave
-    /// generator that leave it no room hold it whatever turns.
+    /// Checks that each tooth passes its lobe and its valley. There it has no lever arm to close a gap, so a negative
+    /// gap blocks it.
     pub(super) fn check_lobe_and_valley(&self, lap: u64) -> Result<(), SolveError> {
         for node in [0, INTERVALS] {
             for tooth in &self.teeth {
@@ -187,7 +188,7 @@ impl<'a> FirstTeeth<'a> {
     }
 }
 
-/// The place of the least value.
+/// Returns the index of the smallest value.
 fn least(values: &[f64]) -> usize {
     let mut least = 0;
     for (index, value) in values.iter().enumerate() {
@@ -198,8 +199,8 @@ fn least(values: &[f64]) -> usize {
     least
 }
 
-/// The least value of a parabola through values at -1, 0 and 1, and where between these it is; none where it has no
-/// least value there.
+/// Returns the place and value of the minimum of a parabola through values at -1, 0 and 1. Returns none if there is no
+/// minimum between these.
 pub(super) fn vertex([before, middle, behind]: [f64; 3]) -> Option<(f64, f64)> {
     let bend = before - 2.0 * middle + behind;
     let place = 0.5 * (before - behind) / bend;

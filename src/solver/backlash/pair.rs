@@ -1,21 +1,21 @@
-//! The backlash while two teeth, one on each side, are the first: a smooth curve.
+//! Backlash while one pair of teeth, one on each side, is first: a smooth curve.
 
 use super::first::{FirstTeeth, vertex};
 use super::{Found, MARGIN, sum};
 use crate::contact::PerContact;
 use crate::root::NotConverged;
 
-/// Simpson's rule is believed where it differs from the trapezoid rule by less than this share: its own error is about
-/// the square.
+/// Largest relative difference to the trapezoid rule at which Simpson's rule is accepted. Its own error is about the
+/// square of it.
 const SMOOTH: f64 = 3e-4;
 
-/// Steps of a golden-section search: the bracket shrinks by 4e-9, and a least value is then known to all digits.
+/// Steps of a golden-section search. They shrink the bracket by 4e-9, so the minimum is exact to all digits.
 const SECTIONS: u32 = 40;
 
-/// An extreme that is nearer than this share to what was seen is rounding.
+/// Relative gain over the extreme found so far that counts as rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// The first teeth in front of their lobes and behind.
+/// First teeth in front of the lobes and behind them.
 pub(super) struct Pair<'a> {
     pub(super) front: &'a FirstTeeth<'a>,
     pub(super) behind: &'a FirstTeeth<'a>,
@@ -30,7 +30,7 @@ impl Pair<'_> {
         Ok(PerContact::of(|contact| front.get(contact) + behind.get(contact)))
     }
 
-    /// Adds what stands between two fractions of the lap.
+    /// Adds the integral and the extremes between two fractions of the lap.
     pub(super) fn integrate(&self, start: f64, end: f64, found: &mut Found) -> Result<(), NotConverged> {
         self.halve(start, end, [self.at(start)?, self.at(end)?], found)
     }
@@ -48,7 +48,7 @@ impl Pair<'_> {
         let bend = |contact| (ends.get(contact) - at_middle.get(contact)).abs() * (2.0 / 3.0);
         let scale: f64 = at_middle.iter().map(|(_, part)| part.abs()).sum();
         let is_smooth = ends.iter().all(|(contact, _)| bend(contact) <= SMOOTH * scale);
-        // What is left on a stretch that short counts for nothing.
+        // The rest of so short a stretch is negligible.
         if !is_smooth && end - start > MARGIN {
             self.halve(start, middle, [at_start, at_middle], found)?;
             return self.halve(middle, end, [at_middle, at_end], found);
@@ -64,7 +64,7 @@ impl Pair<'_> {
         self.look_for_extremes(start, end, values_rad, found)
     }
 
-    /// Looks between the values of a stretch where a parabola says that an extreme may stand there.
+    /// Searches a stretch for an extreme if a parabola through its values predicts one.
     fn look_for_extremes(
         &self,
         start: f64,
@@ -77,7 +77,7 @@ impl Pair<'_> {
             let Some((_, least)) = vertex(signed) else { continue };
             let nearest = signed.into_iter().fold(f64::INFINITY, f64::min);
             let best = if sign > 0.0 { found.smallest.1 } else { -found.largest.1 };
-            // The parabola may be off by what it says itself.
+            // The parabola's error can be as large as its own prediction.
             if least - (nearest - least) < best - ROUNDING * best.abs() {
                 self.sections(start, end, sign, found)?;
             }
