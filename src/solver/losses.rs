@@ -1,11 +1,12 @@
-//! What a turn costs: slip, friction's power, efficiency (docs/explanation/theory.md section 10); wear, the bearing's load and life, and duty in
-//! the modules below.
+//! Friction losses: slip, power, efficiency (docs/explanation/theory.md section 10). The modules below contain wear,
+//! bearing load and life, and duty.
 //!
-//! Friction is taken to first order in its coefficients: normal forces are those without friction, and what is lost is what they lose
-//! at the slip of the kinematics. How far that is from an exact equilibrium was measured, see [`Friction::first_order_error`].
+//! Friction is of first order in its coefficients: the normal forces are those without friction. The loss is their
+//! friction power at the kinematic slip. The difference to an exact equilibrium was measured, see
+//! [`Friction::first_order_error`].
 //!
-//! Everything is per radian of the wave generator *against the carrier*, whichever member is fixed. Which one that is comes in with
-//! [`Mechanism::loss_share`] and [`Mechanism::turning_rad_per_s`].
+//! All quantities are per radian of the wave generator *relative to the carrier*, whichever member is fixed. The fixed
+//! member enters in [`Mechanism::loss_share`] and [`Mechanism::turning_rad_per_s`].
 
 pub mod bearing;
 pub mod duty;
@@ -21,34 +22,34 @@ use crate::mesh::greatest_common_divisor;
 use crate::ring::FlankPoint;
 use crate::violation::{Parameter, Violation};
 
-/// What losses need to know of a drive.
+/// Properties of a drive that the losses depend on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mechanism {
-    /// `U`: lobes of the wave generator.
+    /// `U`: number of lobes of the wave generator.
     pub lobes: u32,
-    /// `Z_G`: teeth in theory.
+    /// `Z_G`: theoretical number of teeth.
     pub teeth: u32,
-    /// `Z'_G`: installed teeth.
+    /// `Z'_G`: number of installed teeth.
     pub installed: u32,
-    /// `Z_K`: teeth of the ring.
+    /// `Z_K`: number of ring teeth.
     pub ring_teeth: u32,
-    /// `r`.
+    /// `r`: tooth radius.
     pub tooth_radius_mm: f64,
-    /// Whether a tooth is free to spin about its own axis; a flat-sided one is not.
+    /// True if a tooth can spin about its own axis. A flat-sided tooth cannot.
     pub tooth_spins: bool,
     /// `R_race`: speed of a race along the cam over its turning: `R0` of a harmonic cam and an eccentric, `(a + b)/2` of an ellipse,
     /// `R - r` of a harmonic path.
     pub race_radius_mm: f64,
-    /// Whether items deviate, so that all teeth are listed and no two lobes are loaded alike.
+    /// True if items deviate. All teeth are then listed, and no two lobes carry the same load.
     pub tells_items_apart: bool,
 }
 
-/// A tooth in mesh and what it bears.
+/// Tooth in mesh and its loads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadedTooth {
-    /// ψ, from the middle of its lobe.
+    /// ψ, measured from the middle of its lobe.
     pub position_rad: f64,
-    /// The lobe, counted from 0 in the sense of ψ.
+    /// Index of the lobe, counted from 0 in the direction of ψ.
     pub lobe: u32,
     /// `d`: distance of its centre from the axis.
     pub center_radius_mm: f64,
@@ -58,84 +59,86 @@ pub struct LoadedTooth {
     pub cam_curvature_per_mm: f64,
     /// `1 + rκ` of the ring's flank.
     pub regularity: f64,
-    /// The corner of the ring's tip, against which a tooth is pressed that stands before the flank.
+    /// Corner of the ring's tip. A tooth touches it before it reaches the flank.
     pub corner: Option<FlankPoint>,
     /// `F_H`, `F_K`, `F_S` without friction.
     pub force_n: PerContact<f64>,
 }
 
-/// Friction of a drive, as given.
+/// Friction parameters of a drive, unchecked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionParameters {
-    /// What the teeth run on.
+    /// Surface that the teeth run on.
     pub wave_generator: WaveGeneratorFriction,
-    /// `μ_K`.
+    /// `μ_K`: friction coefficient at the ring.
     pub ring_coefficient: f64,
-    /// `μ_S`.
+    /// `μ_S`: friction coefficient at the carrier.
     pub carrier_coefficient: f64,
 }
 
-/// What the teeth run on.
+/// Surface that the teeth run on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WaveGeneratorFriction {
-    /// The cam itself: teeth slide on it.
+    /// The cam itself. Teeth slide on it.
     Plain {
-        /// `μ_H`.
+        /// `μ_H`: friction coefficient at the wave generator.
         coefficient: f64,
     },
-    /// A race around the cam, free to turn: a thin bearing, or the bearing that is the eccentric.
+    /// A race around the cam that can turn: a thin bearing, or the bearing that is the eccentric.
     Race {
-        /// `μ_H`, of teeth on the race.
+        /// `μ_H`: friction coefficient between teeth and race.
         coefficient: f64,
-        /// What the race runs on.
+        /// Bearing that supports the race.
         bearing: RaceBearing,
     },
-    /// A race that stands still against the carrier and does not rub on the teeth: the limit of a light bearing.
+    /// A race at rest relative to the carrier, without friction on the teeth: the limit of a light bearing.
     Rolling {
-        /// What the race runs on.
+        /// Bearing that supports the race.
         bearing: RaceBearing,
     },
 }
 
-/// The bearing between cam and race.
+/// Bearing between cam and race.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RaceBearing {
-    /// `μ_b`: its friction couple over load and radius.
+    /// `μ_b`: friction torque divided by load and radius.
     pub coefficient: f64,
-    /// `R_b`: the radius that the coefficient belongs to.
+    /// `R_b`: radius that the coefficient refers to.
     pub radius_mm: f64,
 }
 
-/// Friction that was checked.
+/// Checked friction parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction(FrictionParameters);
 
-/// How a tooth moves over the parts that it touches.
+/// Slip of a tooth on the parts that it touches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToothSlip {
     /// `v_c`: slip of the tooth's surface against the part's, along the counter-clockwise tangent; exactly 0 where it rolls.
     pub slip_mm_per_rad: PerContact<f64>,
-    /// The contact that rolls; none of a tooth that cannot spin or carries nothing.
+    /// The rolling contact. None if the tooth cannot spin or carries no load.
     pub rolls: Option<Contact>,
 }
 
-/// What friction does at one input angle.
+/// Friction at one input angle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Turning {
-    /// How each tooth slips.
+    /// Slip of each tooth.
     pub teeth: Vec<ToothSlip>,
-    /// `v_R`: speed of the race along the cam, against the cam's own turning; 0 without one. Over `R_race` it is the bearing's turning
-    /// over that of wave generator against carrier: near 1, since the race nearly stands still with the carrier.
+    /// `v_R`: speed of the race along the cam relative to the cam's rotation; 0 without a race. Divided by `R_race` it
+    /// is the bearing's speed divided by that of the wave generator relative to the carrier. It is near 1, since the
+    /// race is nearly at rest relative to the carrier.
     pub race_mm_per_rad: f64,
-    /// What friction takes at each contact, of all teeth of all zones.
+    /// Power lost at each contact, summed over all teeth of all zones.
     pub work_nmm_per_rad: PerContact<f64>,
-    /// What the bearing takes.
+    /// Power lost in the bearing.
     pub bearing_work_nmm_per_rad: f64,
-    /// `M0` of these teeth where they stand: the wave generator's torque without friction, unless it moves on under its teeth.
+    /// `M0` of these teeth at their positions: the wave generator's torque without friction, unless its own motion
+    /// under the teeth is included.
     pub input_torque_nmm: f64,
 }
 
-/// The member that stands still.
+/// The fixed member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Fixed {
     /// The wave generator drives the carrier.
@@ -147,17 +150,17 @@ pub enum Fixed {
 }
 
 impl Fixed {
-    /// All three.
+    /// All three fixed members.
     pub const ALL: [Self; 3] = [Self::Ring, Self::Carrier, Self::WaveGenerator];
 }
 
-/// The efficiency with one member fixed, the torque at the driven end given.
+/// Efficiency with one member fixed, for a given torque at the driven end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Efficiency {
-    /// Power out over power in.
+    /// Output power divided by input power.
     pub driven: f64,
-    /// The same when driven from behind; at or below 0 the drive locks itself, and a negative value says how much more than the load's
-    /// power has to be put in from the other end.
+    /// Efficiency when the drive is back-driven. At or below 0 the drive is self-locking. A negative value is the extra
+    /// power required from the other end, relative to the load's power.
     pub back_driven: f64,
 }
 
@@ -167,7 +170,7 @@ pub struct Efficiency {
 pub struct Efficiencies<T> {
     /// The wave generator drives the carrier.
     pub ring_fixed: T,
-    /// The carrier drives the wave generator; at or below 0 the drive locks itself.
+    /// The carrier drives the wave generator; at or below 0 the drive is self-locking.
     pub ring_fixed_back_driven: T,
 }
 
@@ -178,35 +181,35 @@ impl From<Efficiency> for Efficiencies<f64> {
 }
 
 impl Efficiency {
-    /// From the loss over the power at the driven end, `1/(1 + ℓ)` and `1 - ℓ`.
+    /// Returns `1/(1 + ℓ)` and `1 - ℓ`, ℓ being the loss divided by the power at the driven end.
     pub fn of_loss(loss_share: f64) -> Self {
         Self { driven: 1.0 / (1.0 + loss_share), back_driven: 1.0 - loss_share }
     }
 
-    /// Whether no torque at the output turns the drive.
+    /// True if no torque at the output turns the drive.
     pub fn is_self_locking(&self) -> bool {
         self.back_driven <= 0.0
     }
 }
 
-/// How far an efficiency may be from that of an exact equilibrium.
+/// Possible difference between an efficiency and that of an exact equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FirstOrderError {
-    /// The largest error that was measured at such a loss and such coefficients.
+    /// Largest error measured at such a loss and such coefficients.
     pub efficiency: f64,
-    /// μ: the largest coefficient.
+    /// μ: largest coefficient.
     pub coefficient: f64,
-    /// `μ_p`: the friction that there can be along the wave generator as a whole.
+    /// `μ_p`: largest possible friction along the wave generator as a whole.
     pub coefficient_along_cam: f64,
-    /// Whether the coefficients lie where it was measured; beyond, the error is no bound.
+    /// True if the coefficients are in the measured range. Outside it the error is not a bound.
     pub is_within_measured_range: bool,
 }
 
 impl Mechanism {
-    /// That of a drive whose items are all alike.
+    /// Returns the mechanism of a drive whose items are all alike.
     pub fn of(drive: &Drive) -> Self {
         let p = drive.parameters();
-        // Counts of a checked drive are positive and small.
+        // The counts of a checked drive are positive and small.
         let whole = |count: i64| u32::try_from(count).unwrap_or(u32::MAX);
         Self {
             lobes: drive.lobes(),
@@ -220,29 +223,29 @@ impl Mechanism {
         }
     }
 
-    /// `g = gcd(U, Z'_G)`: so many lobes are loaded alike; none like another where items deviate.
+    /// Returns `g = gcd(U, Z'_G)`, the number of lobes that carry the same load; 1 if items deviate.
     pub fn lobes_loaded_alike(&self) -> u64 {
         if self.tells_items_apart { 1 } else { greatest_common_divisor(self.lobes.into(), self.installed.into()) }
     }
 
-    /// `k = Z_K/U`.
+    /// Returns `k = Z_K/U`.
     pub fn ring_teeth_per_wave(&self) -> f64 {
         f64::from(self.ring_teeth) / f64::from(self.lobes)
     }
 
-    /// `s = sign(Z_G - Z_K)`.
+    /// Returns `s = sign(Z_G - Z_K)`.
     pub const fn sense(&self) -> f64 {
         if self.teeth > self.ring_teeth { 1.0 } else { -1.0 }
     }
 
-    /// What the sum over the listed teeth is to be multiplied by: zones that are alike are listed once.
+    /// Returns the factor for sums over the listed teeth. Zones that are alike are listed only once.
     pub fn zones_in_torque(&self) -> f64 {
         let is_one_zone = !self.tells_items_apart && self.installed.is_multiple_of(self.lobes);
         if is_one_zone { f64::from(self.lobes) } else { 1.0 }
     }
 
-    /// Speed of the driving member over that of the driven one, both against the fixed one; losses neglected also the torque that is taken off
-    /// over the torque that drives: `s Z_G/U`, `-s Z_K/U`, `Z_G/Z_K`.
+    /// Returns the speed ratio of driving to driven member, both relative to the fixed one: `s Z_G/U`, `-s Z_K/U`,
+    /// `Z_G/Z_K`. Without losses it is also the ratio of output to input torque.
     pub fn speed_ratio(&self, fixed: Fixed) -> f64 {
         let over = |one: u32, other: u32| f64::from(one) / f64::from(other);
         match fixed {
@@ -252,9 +255,10 @@ impl Mechanism {
         }
     }
 
-    /// The torque that holds the fixed member over the torque that drives, in its sense where positive: what is taken off less what is put in.
+    /// Returns the torque on the fixed member divided by the input torque, positive in its direction: output minus
+    /// input.
     pub fn holding_torque_ratio(&self, fixed: Fixed) -> f64 {
-        // As whole numbers of teeth, so that nothing cancels.
+        // Whole numbers of teeth avoid cancellation.
         let over = |one: u32, other: u32| f64::from(one) / f64::from(other);
         match fixed {
             Fixed::Ring => self.sense() * over(self.ring_teeth, self.lobes),
@@ -263,7 +267,8 @@ impl Mechanism {
         }
     }
 
-    /// The loss over the power at the driven end, `ℓ`, from the loss ratio ν: `ν Z_K/Z_G`, `ν`, `ν U/Z_G`.
+    /// Returns the loss divided by the power at the driven end, `ℓ`, from the loss ratio ν: `ν Z_K/Z_G`, `ν`, `ν
+    /// U/Z_G`.
     pub fn loss_share(&self, fixed: Fixed, loss_ratio: f64) -> f64 {
         let turns = match fixed {
             Fixed::Ring => self.ring_teeth,
@@ -273,18 +278,18 @@ impl Mechanism {
         loss_ratio * (f64::from(turns) / f64::from(self.teeth))
     }
 
-    /// The efficiency at a loss ratio ν; over a period, from its mean.
+    /// Returns the efficiency at a loss ratio ν. Over a period, use the mean ν.
     pub fn efficiency(&self, fixed: Fixed, loss_ratio: f64) -> Efficiency {
         Efficiency::of_loss(self.loss_share(fixed, loss_ratio))
     }
 
-    /// `|ω_HS|`, wave generator against carrier, with the ring fixed: `|ω_H| Z_K/Z_G`.
+    /// Returns `|ω_HS|`, the speed of the wave generator relative to the carrier with the ring fixed: `|ω_H| Z_K/Z_G`.
     pub fn turning_rad_per_s(&self, input_speed_rpm: f64) -> f64 {
         input_speed_rpm * (2.0 * PI / 60.0) * (f64::from(self.ring_teeth) / f64::from(self.teeth))
     }
 
-    /// The slips of a tooth that does not spin: `a_H = d/cos γ - r`, `a_K = s(d/cos β + r)/k`, at a corner `s(d tan γ sin β + (d cos β + ℓ)/k)`, and
-    /// `a_S = -s d tan β/k`.
+    /// Returns the slips of a tooth that does not spin: `a_H = d/cos γ - r`, `a_K = s(d/cos β + r)/k`, at a corner `s(d
+    /// tan γ sin β + (d cos β + ℓ)/k)`, and `a_S = -s d tan β/k`.
     fn slip_without_spin_mm_per_rad(&self, tooth: &LoadedTooth) -> PerContact<f64> {
         let (k, s, r) = (self.ring_teeth_per_wave(), self.sense(), self.tooth_radius_mm);
         let (d, t) = (tooth.center_radius_mm, tooth.tan_pressure_angle);
@@ -302,8 +307,8 @@ impl Mechanism {
         }
     }
 
-    /// What friction does to these teeth: all in mesh of one zone where zones are alike, of all zones otherwise; at least one carries,
-    /// away from both ends of its pass.
+    /// Returns the friction at these teeth: all teeth in mesh, of one zone if zones are alike. At least one carries
+    /// load, away from both ends of its mesh.
     pub fn turning(&self, friction: &Friction, teeth: &[LoadedTooth]) -> Turning {
         let slips: Vec<_> = teeth.iter().map(|tooth| self.slip_without_spin_mm_per_rad(tooth)).collect();
         let race_mm_per_rad = self.race_mm_per_rad(friction, teeth, &slips);
@@ -329,8 +334,8 @@ impl Mechanism {
         }
     }
 
-    /// The spin at which a tooth loses least: there its moments balance. `-rω` is the median of the slips, weighted by `μ_c F_c`, so the
-    /// contact of the median rolls.
+    /// Returns the spin at which a tooth loses least; its moments balance there. `-rω` is the median of the slips,
+    /// weighted by `μ_c F_c`. The contact of the median therefore rolls.
     fn least_slip(&self, slip: &PerContact<f64>, limit_n: &PerContact<f64>) -> ToothSlip {
         let rolls = if self.tooth_spins {
             let weighted = |of| Weighted { place: *slip.get(of), weight: *limit_n.get(of), of };
@@ -343,15 +348,15 @@ impl Mechanism {
         ToothSlip { slip_mm_per_rad: PerContact::of(|contact| slip.get(contact) - spin_mm_per_rad), rolls }
     }
 
-    /// `D |v_R|`: what the bearing takes under the forces of all teeth.
+    /// Returns `D |v_R|`, the bearing's loss under the forces of all teeth.
     fn bearing_work_nmm_per_rad(&self, friction: &Friction, load_n: f64, race_mm_per_rad: f64) -> f64 {
         let drag_n = |bearing: RaceBearing| bearing.drag_n(load_n, self.race_radius_mm);
         friction.bearing().map_or(0.0, |bearing| drag_n(bearing) * race_mm_per_rad.abs())
     }
 
-    /// `v_R`: the speed of the race at which least is lost, `Σ min_ω Σ μ_c F_c |v_c| + D |v_R|`. Each tooth's part is convex and piecewise
-    /// linear; its slope changes where its contact with the race would roll together with another one, at `a_H - a_K` and `a_H - a_S`.
-    /// The whole is therefore a weighted median of these places and of 0.
+    /// Returns `v_R`, the race speed that minimizes the loss `Σ min_ω Σ μ_c F_c |v_c| + D |v_R|`. Each tooth's part is
+    /// convex and piecewise linear. Its slope changes where its contact with the race would roll together with another
+    /// contact, at `a_H - a_K` and `a_H - a_S`. The minimum is therefore at a weighted median of these points and of 0.
     fn race_mm_per_rad(&self, friction: &Friction, teeth: &[LoadedTooth], slips: &[PerContact<f64>]) -> f64 {
         let bearing = match friction.0.wave_generator {
             WaveGeneratorFriction::Plain { .. } => return 0.0,
@@ -366,8 +371,8 @@ impl Mechanism {
             if !self.tooth_spins {
                 return [with(0.0, limit_n.wave_generator), with(0.0, 0.0)];
             }
-            // Where race and ring roll together the slope of the other two contacts' least loss changes by 2 μ_K F_K, and likewise at the
-            // slot; the race takes no steeper one than μ_H F_H of either sign.
+            // Where race and ring roll together, the slope of the least loss of the other two contacts changes by 2 μ_K
+            // F_K, likewise at the slot. The race's slope is at most μ_H F_H in either direction.
             let most = limit_n.wave_generator.min(limit_n.ring + limit_n.carrier);
             let between = (limit_n.ring - limit_n.carrier).clamp(-most, most);
             [with(slip.ring, 0.5 * (most + between)), with(slip.carrier, 0.5 * (most - between))]
@@ -378,7 +383,7 @@ impl Mechanism {
 }
 
 impl LoadedTooth {
-    /// A tooth where it stands, under these forces.
+    /// Returns a tooth at its position under these forces.
     pub const fn new(lobe: u32, center: &ToothCenter, flank: &FlankPoint, force_n: PerContact<f64>) -> Self {
         Self {
             position_rad: center.position.from_lobe_rad,
@@ -392,7 +397,7 @@ impl LoadedTooth {
         }
     }
 
-    /// `|h'| = d sin γ`: lever arm of `F_H`.
+    /// Returns `|h'| = d sin γ`, the lever arm of `F_H`.
     pub fn lever_arm_mm(&self) -> f64 {
         self.center_radius_mm * self.tan_pressure_angle / secant(self.tan_pressure_angle)
     }
@@ -402,7 +407,7 @@ impl Friction {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// Every value that is out of its range.
+    /// All values outside their ranges.
     pub fn new(parameters: &FrictionParameters) -> Result<Self, Vec<Violation>> {
         let friction = Self(*parameters);
         let coefficient = friction.coefficient();
@@ -415,12 +420,12 @@ impl Friction {
         if violations.is_empty() { Ok(friction) } else { Err(violations) }
     }
 
-    /// The parameters, as given.
+    /// Returns the unchecked parameters.
     pub const fn parameters(&self) -> &FrictionParameters {
         &self.0
     }
 
-    /// `μ_c`; none where the race does not rub on the teeth.
+    /// Returns `μ_c`; none if the race has no friction on the teeth.
     fn coefficient(&self) -> PerContact<f64> {
         let wave_generator = match self.0.wave_generator {
             WaveGeneratorFriction::Plain { coefficient } | WaveGeneratorFriction::Race { coefficient, .. } => {
@@ -431,7 +436,7 @@ impl Friction {
         PerContact { wave_generator, ring: self.0.ring_coefficient, carrier: self.0.carrier_coefficient }
     }
 
-    /// The bearing between cam and race, where there is one.
+    /// Returns the bearing between cam and race, if there is one.
     pub const fn bearing(&self) -> Option<RaceBearing> {
         match self.0.wave_generator {
             WaveGeneratorFriction::Plain { .. } => None,
@@ -439,15 +444,16 @@ impl Friction {
         }
     }
 
-    /// `μ_c F_c`.
+    /// Returns `μ_c F_c`.
     fn limit_n(&self, force_n: &PerContact<f64>) -> PerContact<f64> {
         let coefficient = self.coefficient();
         PerContact::of(|contact| coefficient.get(contact) * force_n.get(contact))
     }
 
-    /// How far an efficiency at the loss ℓ may be from that of an exact equilibrium with Coulomb friction: `(C μ + 10 μ_p) ℓ`, μ the
-    /// largest coefficient, `μ_p` what friction there can be along the wave generator as a whole: on a race no more than its bearing
-    /// has. C and the ranges were measured (docs/explanation/theory.md section 10.6, `tests/reference/friction.py ranges`).
+    /// Returns the error of an efficiency at the loss ℓ against an exact equilibrium with Coulomb friction: `(C μ + 10
+    /// μ_p) ℓ`. μ is the largest coefficient and `μ_p` the largest possible friction along the wave generator as a
+    /// whole. On a race `μ_p` is at most the bearing's friction. C and the ranges were measured
+    /// (docs/explanation/theory.md section 10.6, `tests/reference/friction.py ranges`).
     pub fn first_order_error(&self, mechanism: &Mechanism, loss_share: f64) -> FirstOrderError {
         let of_bearing =
             self.bearing().map_or(0.0, |bearing| bearing.coefficient * bearing.radius_mm / mechanism.race_radius_mm);
@@ -468,31 +474,31 @@ impl Friction {
     }
 }
 
-/// Error of an efficiency over μℓ by friction along the cam as a whole.
+/// Error of an efficiency, divided by μℓ, from friction along the cam as a whole.
 const ERROR_ALONG_CAM: f64 = 10.0;
-/// The same by friction of each tooth in itself, which shows where the cam does not drag: on a race.
+/// The same from the friction of each single tooth. It is visible on a race, where the cam has no drag.
 const ERROR_ON_RACE: f64 = 2.5;
-/// The same of teeth that cannot spin.
+/// The same for teeth that cannot spin.
 const ERROR_ON_RACE_WITHOUT_SPIN: f64 = 9.5;
-/// The largest coefficient for which these hold.
+/// Largest measured coefficient.
 pub const MEASURED_TO: f64 = 0.1;
-/// The same along the cam.
+/// Largest measured friction along the cam.
 pub const MEASURED_TO_ALONG_CAM: f64 = 0.05;
 
 impl RaceBearing {
-    /// `D = μ_b R_b ΣF_H/R_race`: friction of the bearing along the race.
+    /// Returns `D = μ_b R_b ΣF_H/R_race`, the bearing's friction force along the race.
     fn drag_n(&self, load_n: f64, race_radius_mm: f64) -> f64 {
         self.coefficient * self.radius_mm * load_n / race_radius_mm
     }
 }
 
 impl Turning {
-    /// What is lost altogether.
+    /// Returns the total loss.
     pub fn lost_nmm_per_rad(&self) -> f64 {
         self.work_nmm_per_rad.iter().map(|(_, &work)| work).sum::<f64>() + self.bearing_work_nmm_per_rad
     }
 
-    /// `ν = P/(M0 ω_HS)`.
+    /// Returns `ν = P/(M0 ω_HS)`.
     pub fn loss_ratio(&self) -> f64 {
         self.lost_nmm_per_rad() / self.input_torque_nmm
     }
@@ -507,7 +513,7 @@ pub struct AtInputAngle {
     pub value: f64,
 }
 
-/// The mean over a period, by trapezes: over equal intervals with both ends, and over places of any distance where a jump stands twice.
+/// Returns the mean over a period by the trapezoidal rule. The points may be unequally spaced; a jump has two points.
 pub fn mean_over_period(column: &[AtInputAngle]) -> f64 {
     let (mut area, mut length) = (0.0, 0.0);
     for pair in column.windows(2) {
@@ -518,12 +524,12 @@ pub fn mean_over_period(column: &[AtInputAngle]) -> f64 {
     area / length
 }
 
-/// `1/cos` of the angle with this tangent.
+/// Returns `1/cos` of the angle with this tangent.
 fn secant(tan: f64) -> f64 {
     (1.0 + tan * tan).sqrt()
 }
 
-/// A place with a weight.
+/// Point with a weight.
 #[derive(Debug, Clone, Copy)]
 struct Weighted<T> {
     place: f64,
@@ -531,7 +537,8 @@ struct Weighted<T> {
     of: T,
 }
 
-/// The weighted median, where `Σ weight |x - place|` is least; the lowest place if there are several, none where nothing weighs.
+/// Returns the weighted median, which minimizes `Σ weight |x - place|`. It is the lowest if there are several, and none
+/// if all weights are zero.
 fn weighted_median<T>(places: &mut [Weighted<T>]) -> Option<&Weighted<T>> {
     places.sort_unstable_by(|one, other| one.place.total_cmp(&other.place));
     let half = 0.5 * places.iter().map(|place| place.weight).sum::<f64>();

@@ -1,4 +1,4 @@
-//! The load on the wave generator's bearing and how long it lasts (docs/explanation/theory.md sections 4.9 and 10.5).
+//! Load and life of the wave generator's bearing (docs/explanation/theory.md sections 4.9 and 10.5).
 
 use std::f64::consts::PI;
 
@@ -6,7 +6,8 @@ use nalgebra::Vector2;
 
 use crate::losses::{LoadedTooth, Mechanism};
 
-/// What rolls in a bearing: its life falls with the third power of the load with balls, with the power 10/3 with rollers.
+/// Rolling element of a bearing. Its life falls with the third power of the load with balls, with the power 10/3 with
+/// rollers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
@@ -18,12 +19,12 @@ pub enum RollingElement {
     Roller,
 }
 
-/// The bearing that is the eccentric.
+/// Rating of the bearing that is the eccentric.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BearingRating {
-    /// Its dynamic load rating C.
+    /// Dynamic load rating C.
     pub dynamic_load_rating_n: f64,
-    /// What rolls in it.
+    /// Rolling element of the bearing.
     pub element: RollingElement,
 }
 
@@ -31,11 +32,11 @@ pub struct BearingRating {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct BearingLife {
-    /// The constant radial load under which it would last as long.
+    /// Constant radial load that gives the same life.
     pub mean_load_n: f64,
-    /// Millions of revolutions of one of its rings against the other.
+    /// Life in millions of revolutions of one ring relative to the other.
     pub life_million_revolutions: f64,
-    /// How fast they turn against each other, ring of the drive fixed, given a speed.
+    /// Relative speed of the bearing's rings with the ring of the drive fixed, given a speed.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub speed_rpm: Option<f64>,
     /// The life in hours, given a speed.
@@ -44,7 +45,7 @@ pub struct BearingLife {
 }
 
 impl BearingRating {
-    /// How long it lasts under a mean load, in hours where its rings turn at a known speed.
+    /// Returns the life under a mean load, in hours if the speed of its rings is known.
     pub fn life(&self, mean_load_n: f64, speed_rpm: Option<f64>) -> BearingLife {
         let life_h = |speed_rpm| self.element.life_h(self.dynamic_load_rating_n, mean_load_n, speed_rpm);
         BearingLife {
@@ -56,17 +57,17 @@ impl BearingRating {
     }
 }
 
-/// A load that a bearing bears for some of its turns.
+/// Load on a bearing during a number of revolutions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadForRevolutions {
     /// The radial load.
     pub load_n: f64,
-    /// How many revolutions, or what is in proportion to them.
+    /// Number of revolutions, or any quantity proportional to it.
     pub revolutions: f64,
 }
 
 impl RollingElement {
-    /// `p` of the life equation.
+    /// Returns `p` of the life equation.
     pub const fn life_exponent(self) -> f64 {
         match self {
             Self::Ball => 3.0,
@@ -74,28 +75,29 @@ impl RollingElement {
         }
     }
 
-    /// The constant load under which a bearing lasts as many revolutions as under these: `(Σ n F^p/Σ n)^(1/p)`.
+    /// Returns the constant load with the same life as these loads: `(Σ n F^p/Σ n)^(1/p)`.
     pub fn mean_load_n(self, loads: &[LoadForRevolutions]) -> f64 {
         let largest_n = loads.iter().map(|load| load.load_n).fold(0.0, f64::max);
         if largest_n <= 0.0 {
             return 0.0;
         }
-        // Over the largest, so that no power leaves the range of doubles.
+        // Relative to the largest load, so that no power overflows or underflows.
         let share = |load: &LoadForRevolutions| load.revolutions * (load.load_n / largest_n).powf(self.life_exponent());
         let revolutions: f64 = loads.iter().map(|load| load.revolutions).sum();
         largest_n * (loads.iter().map(share).sum::<f64>() / revolutions).powf(1.0 / self.life_exponent())
     }
 
-    /// Basic rating life at 90 % reliability, `(C/P)^p` million revolutions (ISO 281), `P` a radial load and `C` the dynamic load rating;
-    /// infinite without load.
+    /// Returns the basic rating life at 90 % reliability, `(C/P)^p` million revolutions (ISO 281). `P` is a radial load
+    /// and `C` the dynamic load rating. The life is infinite without load.
     pub fn life_h(self, dynamic_load_rating_n: f64, mean_load_n: f64, speed_rpm: f64) -> f64 {
         1e6 * (dynamic_load_rating_n / mean_load_n).powf(self.life_exponent()) / (60.0 * speed_rpm)
     }
 }
 
 impl Mechanism {
-    /// What the teeth's normal forces come to on the wave generator, in its frame, x along the middle of lobe 0: `-Σ F_H n(φ + 2πu/U)`
-    /// over all teeth, which are those that the mesh lists (docs/explanation/theory.md section 4.9). Nothing where two lobes or more are loaded alike.
+    /// Returns the resultant of the teeth's normal forces on the wave generator, in its frame with x along the middle
+    /// of lobe 0: `-Σ F_H n(φ + 2πu/U)` over all teeth, which the mesh lists (docs/explanation/theory.md section 4.9).
+    /// It is zero if two or more lobes carry the same load.
     pub fn radial_force_n(&self, teeth: &[LoadedTooth]) -> Vector2<f64> {
         if self.lobes_loaded_alike() > 1 {
             return Vector2::zeros();

@@ -1,4 +1,5 @@
-//! What friction takes over several loads in turn (docs/explanation/theory.md section 10.5): what may be averaged over them, and how.
+//! Friction losses over the load points of a duty cycle (docs/explanation/theory.md section 10.5), with the averaging
+//! rule of each quantity.
 //!
 //! | quantity | over the points of a duty |
 //! |---|---|
@@ -6,8 +7,8 @@
 //! | efficiency | energy out over energy in, so the loss ratio is weighted by the power without friction |
 //! | wear | mean over time *at each place* of a part: depths add where they are, so peaks at different places do not |
 //! | bearing's life | loads by revolutions and the life's exponent; then the mean speed |
-//! | forces, stresses, p·v, wind-up | the worst point: no other one makes it less |
-//! | torque capacity | of no point: it does not hang on the load |
+//! | forces, stresses, p·v, wind-up | the worst point: no other point reduces it |
+//! | torque capacity | none: it does not depend on the load |
 
 use std::f64::consts::PI;
 
@@ -23,7 +24,7 @@ use crate::losses::{Efficiencies, FirstOrderError, Fixed, Friction, Mechanism};
 use crate::sweep::{Peak, Points, States, Sweep, sweep_with_deviations};
 use crate::{SolveError, Stop};
 
-/// What is asked of friction.
+/// Loss parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LossParameters {
     /// Friction at the contacts.
@@ -41,26 +42,26 @@ pub struct DutyPoint {
     pub load: LoadCase,
     /// Speed of the wave generator, ring fixed; each point of a duty has one.
     pub input_speed_rpm: Option<f64>,
-    /// Its share of the running time, or what is in proportion to it.
+    /// Share of the running time, or any quantity proportional to it.
     pub share_of_time: f64,
 }
 
-/// The loads that a drive bears in turn, one at least.
+/// Loads of a duty cycle, at least one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Duty {
-    /// Each of them.
+    /// All loads.
     pub points: Vec<DutyPoint>,
-    /// The one with the largest torque.
+    /// The load with the largest torque.
     pub hardest: usize,
 }
 
 impl Duty {
-    /// The load with the largest torque.
+    /// Returns the load with the largest torque.
     pub fn hardest(&self) -> &LoadCase {
         &self.points[self.hardest].load
     }
 
-    /// Mean speed of the wave generator: revolutions over running time.
+    /// Returns the mean speed of the wave generator: revolutions divided by running time.
     pub fn mean_input_speed_rpm(&self) -> f64 {
         let time: f64 = self.points.iter().map(|point| point.share_of_time).sum();
         let turned = |point: &DutyPoint| point.share_of_time * point.input_speed_rpm.unwrap_or_default();
@@ -68,82 +69,88 @@ impl Duty {
     }
 }
 
-/// What friction takes over all points of a duty. The means of a sweep to a tolerance keep it, relative to the whole loss but to 1e-10 at the finest; wear, the
-/// bearing's load and the products of pressure and velocity are those of the listed input angles.
+/// Friction losses over all points of a duty. The means of a sweep to a tolerance keep it, relative to the total loss,
+/// but never below 1e-10. Wear, bearing load and the products of pressure and velocity are those of the listed input
+/// angles.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct LossTotals {
     /// Efficiency over the period, the torque at the driven end given.
     pub efficiency: Efficiencies<f64>,
-    /// Whether no torque at the output turns the drive, ring fixed.
+    /// True if no torque at the output turns the drive, ring fixed.
     pub self_locking: bool,
-    /// The largest error against exact equilibria that was measured at such a loss and such coefficients, of the efficiency with the ring fixed.
+    /// Largest error of the efficiency with the ring fixed against exact equilibria, measured at such a loss and such
+    /// coefficients.
     pub efficiency_error: f64,
-    /// Whether the coefficients lie where that error was measured; beyond, it is no bound.
+    /// True if the coefficients are in the range where that error was measured. Outside it the error is not a bound.
     pub is_within_measured_range: bool,
-    /// The torque that the wave generator really needs, ring fixed: `load.input_torque_nm` over the efficiency. Of a duty, that of its hardest point.
+    /// Torque that the wave generator requires with the ring fixed: `load.input_torque_nm` over the efficiency. For a
+    /// duty, that of its hardest point.
     pub required_input_torque_nm: f64,
     /// Mean power lost over the input torque times the speed of wave generator against carrier.
     pub loss_ratio: f64,
-    /// Where it is lost; these add up to it.
+    /// Loss ratio at each place; the entries add up to the total.
     pub loss_ratio_by_place: LossByPlace,
     /// Mean power lost with the ring fixed, given a speed.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub power_loss_w: Option<f64>,
-    /// Where it is lost, in W; these add up to it.
+    /// Power lost at each place, in W; the entries add up to the total.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub power_loss_by_place_w: Option<LossByPlace>,
-    /// The largest Hertz stress times slip of each contact, ring fixed, in MPa m/s, given a speed. Limits in handbooks hold for the
-    /// load over the projected area, which is far less: the two are never compared.
+    /// Largest product of Hertz stress and slip of each contact, ring fixed, in MPa m/s, given a speed. Limits in
+    /// handbooks refer to the load over the projected area, which is far less: do not compare the two.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub pressure_velocity_mpa_m_per_s: Option<PerContact<Peak>>,
-    /// The largest depth that each part loses in an hour where a tooth touches it, ring fixed, given `friction.wear_rate_mm3_per_nm` and a speed.
-    /// Given `deviations` it is what a place would lose if every tooth that passes it bore as much as the one that bears most: no place loses more. A
-    /// race, which wears all round, has its true mean.
+    /// Largest depth that each part loses per hour where a tooth touches it, ring fixed, given
+    /// `friction.wear_rate_mm3_per_nm` and a speed. Given `deviations` it is an upper bound: every passing tooth is
+    /// taken to carry as much as the tooth with the largest load. A race wears evenly around its circumference and has
+    /// its true mean.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub wear_mm_per_hour: Option<PerContact<WornPlace>>,
-    /// The bearing that is the eccentric, given its `bearing_load_rating_n`; left out where it does not turn.
+    /// Load and life of the bearing that is the eccentric, given its `bearing_load_rating_n`. Left out if the bearing
+    /// does not turn.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub bearing: Option<BearingLife>,
 }
 
-/// What friction takes from a drive under its duty.
+/// Friction losses of a drive under its duty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DutyLosses {
-    /// Over all points.
+    /// Totals over all points.
     pub totals: LossTotals,
-    /// Of each point, in their order.
+    /// Losses of each point, in order.
     pub points: Vec<PointLosses>,
-    /// State by state and angle by angle, of the hardest point.
+    /// Losses of the hardest point for each state and input angle.
     pub hardest: Losses,
-    /// What a designer should be told.
+    /// Findings about the losses.
     pub findings: Vec<Finding>,
 }
 
-/// What friction takes at one point of a duty.
+/// Friction losses at one point of a duty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointLosses {
     /// Efficiency with the ring fixed.
     pub efficiency_ring_fixed: f64,
-    /// Power lost while it runs, ring fixed, given a speed.
+    /// Power lost while this point runs, ring fixed, given a speed.
     pub power_loss_w: Option<f64>,
 }
 
-/// A drive under its duty, swept at these points.
+/// Drive with its duty and sweep points.
 #[derive(Debug, Clone, Copy)]
 pub struct DutySweep<'a> {
     /// The drive.
     pub drive: &'a Drive,
-    /// What its single items deviate by.
+    /// Deviations of its single items.
     pub deviations: &'a Deviations,
-    /// Where its sweeps look.
+    /// Input angles of its sweeps.
     pub points: Points,
-    /// Its loads.
+    /// Loads of the duty.
     pub duty: &'a Duty,
 }
 
 impl DutySweep<'_> {
-    /// What friction takes, given the sweep of the hardest point and what its teeth push the wave generator aside with, where bearings are asked for.
+    /// Returns the losses. Takes the sweep of the hardest point and, if bearings are required, its transverse forces on
+    /// the wave generator.
     ///
     /// # Errors
     /// As [`sweep_with_deviations`].
@@ -175,7 +182,7 @@ impl DutySweep<'_> {
         })
     }
 
-    /// What friction takes of a sweep; the means of one to a tolerance keep it.
+    /// Returns the losses of a sweep. The means of a sweep to a tolerance keep it.
     fn losses_of(
         &self,
         parameters: &LossParameters,
@@ -225,45 +232,45 @@ impl DutySweep<'_> {
     }
 }
 
-/// What one point of a duty, or the only load, costs over a period.
+/// Losses of one point of a duty, or of the only load, over a period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cost {
     /// `M0`: torque of the wave generator without friction.
     pub input_torque_nm: f64,
     /// Speed of the wave generator, ring fixed.
     pub input_speed_rpm: Option<f64>,
-    /// Its share of the running time, or what is in proportion to it.
+    /// Share of the running time, or any quantity proportional to it.
     pub share_of_time: f64,
     /// Mean of ν over the period.
     pub mean: LossByPlace,
-    /// The largest `p·v` of each contact.
+    /// Largest `p·v` of each contact.
     pub pressure_velocity: Option<PerContact<Peak>>,
-    /// What wears.
+    /// Wear of the parts.
     pub wear: Option<Wear>,
-    /// What the bearing bears, where it turns.
+    /// Load on the bearing, if it turns.
     pub bearing: Option<BearingLoad>,
 }
 
-/// The costs of all points, one at least.
+/// Losses of all points, at least one.
 #[derive(Debug)]
 pub struct Costs<'a> {
-    /// The drive that bears them.
+    /// Drive that carries the loads.
     pub mechanism: Mechanism,
-    /// What was asked.
+    /// Loss parameters.
     pub parameters: &'a LossParameters,
-    /// Each point.
+    /// Losses of each point.
     pub points: Vec<Cost>,
 }
 
 impl Costs<'_> {
-    /// A loss ratio over all points: by the powers without friction, since energies add.
+    /// Returns the loss ratio over all points, weighted by the power without friction, since energies add.
     fn loss_ratio(&self, of: impl Fn(&LossByPlace) -> f64) -> f64 {
         if let [only] = self.points.as_slice() {
             return of(&only.mean);
         }
         let (mut ideal, mut lost) = (0.0, 0.0);
         for point in &self.points {
-            // Power without friction is in proportion to this, with the same factor at every point.
+            // Power without friction is proportional to this, with the same factor at every point.
             let power = point.share_of_time * point.input_torque_nm * point.input_speed_rpm.unwrap_or_default();
             ideal += power;
             lost += power * of(&point.mean);
@@ -271,12 +278,12 @@ impl Costs<'_> {
         lost / ideal
     }
 
-    /// Power lost at a point, ring fixed; none without a speed.
+    /// Returns the power lost at a point, ring fixed; none without a speed.
     fn power_at_w(&self, point: &Cost, ratio: f64) -> Option<f64> {
         Some(ratio * point.input_torque_nm * self.mechanism.turning_rad_per_s(point.input_speed_rpm?))
     }
 
-    /// Mean power over time; none without speeds.
+    /// Returns the mean power over time; none without speeds.
     fn power_w(&self, of: impl Fn(&LossByPlace) -> f64) -> Option<f64> {
         let time: f64 = self.points.iter().map(|point| point.share_of_time).sum();
         let powers =
@@ -284,7 +291,7 @@ impl Costs<'_> {
         powers.sum::<Option<f64>>().map(|power_w| power_w / time)
     }
 
-    /// The largest of any point.
+    /// Returns the largest value of all points.
     fn pressure_velocity(&self) -> Option<PerContact<Peak>> {
         let mut points = self.points.iter().map(|point| point.pressure_velocity);
         let first = points.next()??;
@@ -306,7 +313,7 @@ impl Costs<'_> {
         Wear::over_duty(&points?).largest(states)
     }
 
-    /// The bearing's life; a point at which it does not turn uses nothing of it up.
+    /// Returns the bearing's life. A point at which it does not turn uses no life.
     fn bearing(&self) -> Option<BearingLife> {
         let rating = self.parameters.bearing?;
         let only = self.points.iter().find_map(|point| point.bearing)?;
@@ -325,7 +332,7 @@ impl Costs<'_> {
         Some(rating.life(rating.element.mean_load_n(&loads), Some(speed_rpm)))
     }
 
-    /// Over all points; wear stands at the states of the hardest.
+    /// Returns the totals over all points. Wear refers to the states of the hardest point.
     pub fn totals(&self, hardest: usize, states: &States) -> LossTotals {
         let Self { mechanism, parameters, points } = self;
         let loss_ratio = self.loss_ratio(LossByPlace::total);
@@ -359,7 +366,7 @@ impl Costs<'_> {
         }
     }
 
-    /// About friction, and about the bearing's load where it is largest.
+    /// Returns the findings about friction, and about the bearing at its largest load.
     fn findings(&self) -> Vec<Finding> {
         let loss_ratio = self.loss_ratio(LossByPlace::total);
         let of_friction = findings::of_friction(&self.mechanism, &self.parameters.friction, loss_ratio);

@@ -1,4 +1,4 @@
-//! What a period costs: the teeth of a sweep, input angle by input angle.
+//! Losses over a period, from the teeth of a sweep at each input angle.
 
 use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
@@ -17,7 +17,7 @@ use crate::sweep::mean::means;
 use crate::sweep::{Peak, States, Sweep};
 use crate::{SolveError, Stop};
 
-/// A loss ratio or a power, by where it is lost.
+/// Loss ratio or power at each place.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct LossByPlace {
@@ -27,7 +27,7 @@ pub struct LossByPlace {
     pub ring: f64,
     /// Between teeth and carrier.
     pub carrier: f64,
-    /// In the bearing between cam and race; 0 of a plain cam.
+    /// In the bearing between cam and race; 0 for a plain cam.
     pub bearing: f64,
 }
 
@@ -35,54 +35,54 @@ impl LossByPlace {
     const PLACES: [fn(&Self) -> f64; 4] =
         [|loss| loss.wave_generator, |loss| loss.ring, |loss| loss.carrier, |loss| loss.bearing];
 
-    /// In the order of the fields.
+    /// Creates it from values in the order of the fields.
     const fn new([wave_generator, ring, carrier, bearing]: [f64; 4]) -> Self {
         Self { wave_generator, ring, carrier, bearing }
     }
 
-    /// The same quantity of each place.
+    /// Applies a function to each place.
     pub(super) fn of(quantity: impl FnMut(fn(&Self) -> f64) -> f64) -> Self {
         Self::new(Self::PLACES.map(quantity))
     }
 
-    /// What friction does over a torque.
+    /// Returns the friction power divided by a torque.
     fn of_turning(turning: &Turning, input_torque_nmm: f64) -> Self {
         let PerContact { wave_generator, ring, carrier } = turning.work_nmm_per_rad;
         let work_nmm_per_rad = [wave_generator, ring, carrier, turning.bearing_work_nmm_per_rad];
         Self::new(work_nmm_per_rad.map(|work| work / input_torque_nmm))
     }
 
-    /// Altogether.
+    /// Returns the total.
     pub fn total(&self) -> f64 {
         let Self { wave_generator, ring, carrier, bearing } = self;
         wave_generator + ring + carrier + bearing
     }
 }
 
-/// What friction does over the period of a sweep.
+/// Friction losses over the period of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Losses {
     /// Mean loss ratio over the period.
     pub mean: LossByPlace,
     /// The loss ratio at each input angle of the sweep.
     pub loss_ratio: Vec<f64>,
-    /// `v_c`, one entry a state of the sweep; at a race against the race.
+    /// `v_c`, one entry per state of the sweep; relative to the race if there is one.
     pub slip_mm_per_rad: PerContact<Vec<f64>>,
-    /// The contact that rolls, one entry a state.
+    /// The rolling contact, one entry per state.
     pub rolls: Vec<Option<Contact>>,
     /// `v_R` at each input angle; 0 without a race.
     pub race_mm_per_rad: Vec<f64>,
 }
 
 impl Mechanism {
-    /// That of a drive as a sweep lists its teeth.
+    /// Returns the mechanism of a drive for the teeth that a sweep lists.
     pub fn of_sweep(drive: &Drive, sweep: &Sweep) -> Self {
         Self { tells_items_apart: sweep.mesh.tells_items_apart(), ..Self::of(drive) }
     }
 }
 
 impl Losses {
-    /// What friction does over the sweep of this drive under this load.
+    /// Returns the losses over the sweep of this drive under this load.
     ///
     /// # Errors
     /// [`SolveError::NotConverged`] from the geometry, [`SolveError::Stopped`] when `stop` says so.
@@ -94,7 +94,8 @@ impl Losses {
         stop: &dyn Stop,
     ) -> Result<Self, SolveError> {
         let mechanism = Mechanism::of_sweep(drive, sweep);
-        // Where the wave generator moves on under its teeth their arms are others than at the positions of the states.
+        // If the wave generator moves under its teeth, their lever arms differ from those at the positions of the
+        // states.
         let input_torque_nmm = 1e3 * load.input_torque_nm(drive);
         let states = &sweep.states;
         let column = || Vec::with_capacity(states.len());
@@ -131,7 +132,7 @@ impl Losses {
         })
     }
 
-    /// The same with the mean to a tolerance over the total, whatever the input angles of the sweep.
+    /// Returns the same with the mean to a tolerance relative to the total, independent of the sweep's input angles.
     ///
     /// # Errors
     /// As [`Self::of`].
@@ -172,8 +173,9 @@ impl Losses {
         Ok(Self { mean, ..self })
     }
 
-    /// The largest `p·v = σ |v_c|` of each contact over the states of the sweep that these losses belong to, at a turning of the wave generator against the
-    /// carrier, σ the largest Hertz pressure. Handbook limits are on the load over the projected area, which is far less: the two are never compared.
+    /// Returns the largest `p·v = σ |v_c|` of each contact over the states of the sweep that these losses belong to.
+    /// `turning_rad_per_s` is the speed of the wave generator relative to the carrier, σ the largest Hertz pressure.
+    /// Handbook limits refer to the load over the projected area, which is far less: do not compare the two.
     pub fn pressure_velocity_peaks(&self, sweep: &Sweep, turning_rad_per_s: f64) -> PerContact<Peak> {
         let states = &sweep.states;
         PerContact::of(|contact| {
@@ -187,26 +189,26 @@ impl Losses {
     }
 }
 
-/// How fast the parts wear over the states of a sweep (docs/explanation/theory.md section 10.4).
+/// Wear rate of the parts over the states of a sweep (docs/explanation/theory.md section 10.4).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wear {
-    /// Depth of each part where a tooth touches it, one entry a state; none at a race, which has no such place.
+    /// Depth of each part where a tooth touches it, one entry per state; none for a race, which wears evenly.
     pub mm_per_hour: PerContact<Vec<f64>>,
-    /// Depth of a race, which wears all round.
+    /// Depth of a race, which wears evenly around its circumference.
     pub race_mm_per_hour: Option<f64>,
 }
 
-/// The wear of one point of a duty.
+/// Wear of one point of a duty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WearForTime<'a> {
-    /// The point's share of the running time, or what is in proportion to it.
+    /// The point's share of the running time, or any quantity proportional to it.
     pub share_of_time: f64,
-    /// What it wears.
+    /// Wear at this point.
     pub wear: &'a Wear,
 }
 
 impl Wear {
-    /// That of the sweep that these losses belong to.
+    /// Returns the wear of the sweep that these losses belong to.
     ///
     /// # Errors
     /// As [`Losses::of`].
@@ -244,8 +246,8 @@ impl Wear {
         Ok(Self { mm_per_hour, race_mm_per_hour })
     }
 
-    /// The mean over a duty of at least one point, each with its share of the time and swept over the same input angles: at each place, since
-    /// depths add where they are.
+    /// Returns the mean over a duty of at least one point, weighted by time. All points have the same input angles. It
+    /// is taken at each place, since depths add there.
     pub fn over_duty(points: &[WearForTime<'_>]) -> Self {
         let time: f64 = points.iter().map(|point| point.share_of_time).sum();
         let mean = |of: &dyn for<'a> Fn(&'a Self) -> &'a [f64]| -> Vec<f64> {
@@ -260,20 +262,20 @@ impl Wear {
         }
     }
 
-    /// Where each part wears most; none without states.
+    /// Returns the place of the largest wear of each part; none without states.
     pub(super) fn largest(&self, states: &States) -> Option<PerContact<WornPlace>> {
         let peaks = self.peaks(states);
         let of_race = self.race_mm_per_hour.map(|value| WornPlace { value, input_angle_deg: None, position_deg: None });
         PerContact::try_of(|contact| peaks.get(contact).map(WornPlace::from).or(of_race).ok_or(())).ok()
     }
 
-    /// The largest depth of each part and where it is; none of a race.
+    /// Returns the largest depth of each part and its place; none for a race.
     pub fn peaks(&self, states: &States) -> PerContact<Option<Peak>> {
         PerContact::of(|contact| largest(states, self.mm_per_hour.get(contact).iter().copied()))
     }
 }
 
-/// The first of the largest values over the states, none of no values.
+/// Returns the first of the largest values over the states; none if there are no values.
 fn largest(states: &States, values: impl Iterator<Item = f64>) -> Option<Peak> {
     let mut peak: Option<Peak> = None;
     for (state, value) in values.enumerate() {
@@ -285,17 +287,17 @@ fn largest(states: &States, values: impl Iterator<Item = f64>) -> Option<Peak> {
     peak
 }
 
-/// The load on the bearing that is an eccentric, over a period.
+/// Load over a period on the bearing that is an eccentric.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BearingLoad {
     /// Mean over its revolutions, see [`RollingElement::mean_load_n`].
     pub mean_load_n: f64,
-    /// How fast its rings turn against each other, over the wave generator's turning against the carrier.
+    /// Relative speed of its rings, divided by the speed of the wave generator relative to the carrier.
     pub speed_ratio: f64,
 }
 
 impl BearingLoad {
-    /// That of the sweep which these losses and forces belong to; none where the race does not turn.
+    /// Returns the load for the sweep of these losses and forces; none if the race does not turn.
     pub fn of(
         mechanism: &Mechanism,
         element: RollingElement,
@@ -309,7 +311,7 @@ impl BearingLoad {
         for at in 1..input_angle_deg.len() {
             let step_deg = input_angle_deg[at] - input_angle_deg[at - 1];
             turned_deg += step_deg;
-            // Half of the interval at either end, as the means over a period take it.
+            // Half of the interval at either end, as in the means over a period.
             for end in [at - 1, at] {
                 let revolutions = 0.5 * step_deg * speed_ratio(end);
                 loads.push(LoadForRevolutions { load_n: forces.force_n[end], revolutions });
@@ -321,17 +323,18 @@ impl BearingLoad {
     }
 }
 
-/// What the teeth push the wave generator aside with at each input angle of a sweep, in its frame.
+/// Transverse force of the teeth on the wave generator at each input angle of a sweep, in its frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RadialForces {
-    /// The force.
+    /// Magnitude of the force.
     pub force_n: Vec<f64>,
     /// Its direction from the middle of lobe 0.
     pub direction_deg: Vec<f64>,
 }
 
 impl RadialForces {
-    /// Those of a sweep of this drive under this load; none where two lobes or more are loaded alike, so that they balance each other at any load.
+    /// Returns the forces of a sweep of this drive under this load. None if two or more lobes carry the same load, so
+    /// that the forces balance at any load.
     ///
     /// # Errors
     /// As [`Losses::of`].
@@ -366,7 +369,8 @@ impl RadialForces {
     }
 }
 
-/// A tooth under which the wave generator has moved on, in the wave generator's frame: its force goes through the normal there.
+/// Returns a tooth that the wave generator has moved on under, in the wave generator's frame. Its force acts along the
+/// normal there.
 fn passed_by(
     drive: &Drive,
     tooth: &LoadedTooth,
@@ -383,8 +387,8 @@ fn passed_by(
     Ok(LoadedTooth { position_rad, tan_pressure_angle: center.tan_pressure_angle.copysign(position_rad), ..*tooth })
 }
 
-/// Goes through the input angles of a sweep. Where a tooth enters an angle may stand twice, without the tooth and with it; by number the
-/// teeth then start anew.
+/// Visits the input angles of a sweep. An angle may occur twice where a tooth enters: without the tooth and with it.
+/// The tooth numbers then start again.
 fn at_each_input_angle(
     drive: &Drive,
     states: &States,
@@ -410,7 +414,7 @@ fn at_each_input_angle(
     Ok(())
 }
 
-/// The tooth of a state, with where it touches.
+/// Tooth of a state, with its contact points.
 struct ToothOfState {
     state: usize,
     center: ToothCenter,
@@ -418,7 +422,8 @@ struct ToothOfState {
     loaded: LoadedTooth,
 }
 
-/// The tooth of a state. Its place is known in degrees, near the valley to some 1e-14 rad, where it bears next to nothing.
+/// Returns the tooth of a state. Its position is stored in degrees. Near the valley the rounding is about 1e-14 rad,
+/// where its load is negligible.
 fn tooth_of(
     drive: &Drive,
     corner: Option<&TipCorner>,
@@ -428,7 +433,7 @@ fn tooth_of(
     let lobes = drive.lobes();
     let from_lobe_rad = states.position_deg[state].to_radians().min(half_lobe_rad(lobes));
     let center = drive.flank().locus().at(Position::from_lobe(from_lobe_rad, lobes))?;
-    // Only where corners are pressed does a tooth stand before the flank.
+    // A tooth is before the flank only if corners are pressed.
     let corner =
         corner.filter(|corner| corner.is_before_flank(&center.position)).map(|corner| corner.seen_from(&center));
     let flank = corner.unwrap_or_else(|| drive.flank().at(&center));

@@ -1,4 +1,5 @@
-//! Wear by Archard's law (docs/explanation/theory.md section 10.4): volume per force and slip, as a depth per hour where a tooth touches a part.
+//! Wear by Archard's law (docs/explanation/theory.md section 10.4): volume per force and slip, as a depth per hour
+//! where a tooth touches a part.
 
 use std::f64::consts::PI;
 
@@ -9,22 +10,23 @@ use crate::sweep::Peak;
 /// Seconds in an hour.
 const SECONDS: f64 = 3600.0;
 
-/// What decides how fast the parts wear.
+/// Parameters of the wear rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WearParameters {
     /// Specific wear rate of each part at its contact with the teeth, in mm³/(N·m).
     pub rate_mm3_per_nm: PerContact<f64>,
-    /// `|ω_HS|`.
+    /// `|ω_HS|`: speed of the wave generator relative to the carrier.
     pub turning_rad_per_s: f64,
 }
 
-/// How fast a part wears by Archard's law where it wears most.
+/// Largest wear rate of a part, by Archard's law, and its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct WornPlace {
-    /// The depth, in mm an hour.
+    /// Depth, in mm per hour.
     pub value: f64,
-    /// Input angle at which a tooth touches the part there; a race wears all round and has no place.
+    /// Input angle at which a tooth touches the part there. A race wears evenly around its circumference and has no
+    /// place.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub input_angle_deg: Option<f64>,
     /// Position of that tooth, from the middle of its lobe.
@@ -39,8 +41,8 @@ impl From<Peak> for WornPlace {
 }
 
 impl Mechanism {
-    /// How fast the point of contact moves over each part, per radian: `ρ_H dφ` on the cam, `(1 + rκ) d/(k cos β)` on the ring, `dd` in the
-    /// slot.
+    /// Returns the speed of the contact point over each part, per radian: `ρ_H dφ` on the cam, `(1 + rκ) d/(k cos β)`
+    /// on the ring, `dd` in the slot.
     pub fn advance_mm_per_rad(&self, tooth: &LoadedTooth) -> PerContact<f64> {
         let (k, d, t) = (self.ring_teeth_per_wave(), tooth.center_radius_mm, tooth.tan_pressure_angle);
         PerContact {
@@ -51,8 +53,9 @@ impl Mechanism {
         }
     }
 
-    /// How often a point of each part is passed by a loaded tooth, per radian: of the cam by every tooth once a turn against the carrier, of
-    /// the ring by every m-th lobe, of a slot by every lobe.
+    /// Returns the number of loaded teeth that pass a point of each part, per radian. Every tooth passes a point of the
+    /// cam once per revolution relative to the carrier. A point of the ring is passed with every m-th lobe, a point of
+    /// a slot with every lobe.
     fn passes_per_rad(&self) -> PerContact<f64> {
         let (lobes, installed) = (f64::from(self.lobes), f64::from(self.installed));
         PerContact {
@@ -63,12 +66,11 @@ impl Mechanism {
         }
     }
 
-    /// Depth that each part loses in an hour at the point where a tooth touches it. As a point
-    /// of a part meets its teeth always at the same ψ, this is its depth, not a share of it. `line_load_n_per_mm` is the force over the
-    /// width of a cylinder; for another contact the pressure summed along the way of the tooth where that sum is largest.
-    ///
-    /// A race drifts under the teeth and wears all round: its entry is what this tooth adds to that depth, to be summed over the teeth
-    /// and averaged over the period.
+    /// Returns the depth that each part loses per hour at the point where a tooth touches it. A point of a part meets
+    /// its teeth always at the same ψ, so this is its full depth. `line_load_n_per_mm` is the force over the width of a
+    /// cylinder. For another contact it is the pressure summed along the way of the tooth where that sum is largest. A
+    /// race drifts under the teeth and wears evenly: its entry is this tooth's contribution, to be summed over the
+    /// teeth and averaged over the period.
     pub fn wear_mm_per_hour(
         &self,
         friction: &Friction,
