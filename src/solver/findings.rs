@@ -1,4 +1,4 @@
-//! What a designer should be told about a drive that can exist (docs/reference/findings.md).
+//! Findings: warnings and information about a drive that can exist (docs/reference/findings.md).
 
 use std::f64::consts::PI;
 
@@ -23,53 +23,57 @@ use FindingCode as Code;
 /// Contact stress at the fatigue limit of bearing steel (ISO 281:2007).
 pub const FATIGUE_LIMIT_STRESS_MPA: f64 = 1500.0;
 
-/// A wall thinner than this share of its slot's width is reported: a rule of thumb, not a strength calculation.
+/// Wall thickness below which a finding is reported, as a share of the slot's width. A rule of thumb, not a strength
+/// calculation.
 pub const THIN_WALL_SHARE_OF_SLOT: f64 = 0.25;
 
-/// A ring pressure angle beyond this is reported: there the ring carries about three times the cam's radial force, and
-/// friction, which the model leaves out, begins to decide whether the drive turns at all.
+/// Ring pressure angle above which a finding is reported. There the ring carries about three times the cam's radial
+/// force. Friction, which the model leaves out, can then stop the drive from turning.
 pub const STEEP_FLANK_DEG: f64 = 70.0;
 
-/// How far a contact modulus may be from that of steel on steel for Palmgren's constant to hold without a word: steels differ by less.
+/// Largest relative difference from the contact modulus of steel on steel at which Palmgren's constant applies without
+/// a finding. Steels differ by less.
 pub const STEEL_TOLERANCE: f64 = 0.1;
 
-/// A wind-up beyond this share of the period is reported. Lever arms and directions are those of the positions without load, and a wind-up of
-/// one period moves every tooth on by one spacing: a tenth of it by a tenth of a spacing, which begins to be a matter of per cent.
+/// Wind-up above which a finding is reported, as a share of the period. Lever arms and directions are those of the
+/// unloaded positions. A wind-up of one period moves every tooth by one spacing. A tenth of it changes results by some
+/// per cent.
 pub const WIND_UP_SHARE_OF_PERIOD: f64 = 0.1;
 
-/// The same where the wave generator moves on under its teeth, counted in rad times the number of lobes: ways are then true to second order, and the third
-/// one's share, a sixth of the square, is one of a hundred.
+/// The same if the wave generator moves under its teeth: rad times number of lobes. Displacements are then exact to
+/// second order. The third-order term is a sixth of the square, about 1 %.
 pub const WIND_UP_TIMES_LOBES_RAD: f64 = 0.25;
 
-/// A ring pressure angle beyond this is reported where approaches are projected: between the drives that were held against elastic bodies,
-/// at 22.8° the largest force comes out 2 % too large at most, at 34.8° 8 %, at 46.7° 15 % (docs/explanation/validation.md).
+/// Ring pressure angle above which a finding is reported for projected approaches. Compared with elastic bodies, the
+/// largest force is at most 2 % too large at 22.8°, 8 % at 34.8°, 15 % at 46.7° (docs/explanation/validation.md).
 pub const STEEP_FOR_PROJECTION_DEG: f64 = 30.0;
 
-/// An efficiency that may be further off than this is reported.
+/// Possible error of an efficiency above which a finding is reported.
 pub const UNCERTAIN_EFFICIENCY: f64 = 0.05;
 
-/// Share of a bearing's dynamic load rating up to which the equation of its life holds (ISO 281:2007).
+/// Largest share of a bearing's dynamic load rating for which its life equation is valid (ISO 281:2007).
 pub const LIFE_HOLDS_TO_SHARE_OF_RATING: f64 = 0.5;
 
-/// A part behind a contact that adds more than this to what a tooth gives way at its contacts is reported: the wind-up is then a sixth too small, as much
-/// as elastic bodies in a housing were found to add together (docs/explanation/validation.md).
+/// Compliance of a part behind a contact above which a finding is reported, as a share of a tooth's contact deflection.
+/// The wind-up is then a sixth too small. Elastic bodies in a housing add up to the same amount together
+/// (docs/explanation/validation.md).
 pub const SOFT_BACKING_SHARE: f64 = 0.2;
 
-/// A ball's groove, of whose depth the document says nothing, is taken to be this share of the ball's radius deep: a rule of thumb.
+/// Depth of a ball's groove, as a share of the ball's radius, if the document gives none. A rule of thumb.
 pub const GROOVE_DEPTH_SHARE_OF_BALL: f64 = 0.5;
 
-/// A negative backlash closer to zero than this is rounding.
+/// Negative backlash closer to zero than this is rounding.
 const ROUNDING_ARCMIN: f64 = 1e-9;
 
 const STEEL: Material = Material::STEEL;
 
-/// How grave a finding is.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum Severity {
-    /// Good to know.
+    /// Information only.
     Info,
-    /// Likely to trouble the drive.
+    /// Likely to cause a problem in the drive.
     Warning,
 }
 
@@ -77,80 +81,80 @@ pub enum Severity {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum FindingCode {
-    /// The ring's tips are cut away by their own envelope.
+    /// The ring's tips are undercut: their own envelope cuts them.
     Undercut,
     /// The bore ends the flank before its natural tip.
     BoreShortensFlank,
     /// The bore lies inside the natural tip.
     BoreWithoutEffect,
-    /// At some input angle fewer than two teeth of a zone mesh.
+    /// Fewer than two teeth of a zone mesh at some input angle.
     FewTeethInMesh,
     /// The wall between two slots is thin.
     ThinSlotWall,
     /// A loaded tooth's centre leaves the carrier's annulus.
     ToothBeyondCarrier,
-    /// The ring's flank stands steep to the radius.
+    /// The ring's flank is steep to the radius.
     SteepRingFlank,
-    /// The linear law where wind-up or clearance was asked for: it is several times too stiff.
+    /// Linear law although wind-up or clearance is computed: it is several times too stiff.
     LinearLawTooStiff,
-    /// A cam with hollow valleys, which no bearing's ring could follow.
+    /// A cam with concave valleys, which no bearing ring can follow.
     HollowWaveGenerator,
-    /// The teeth's flats end their arcs before the steepest contact.
+    /// The flats of the teeth end the arcs before the steepest contact.
     FlatCutsTheContact,
     /// A ball's contact is longer than its groove is wide.
     ContactBeyondGroove,
-    /// A groove that balls run in is not drawn.
+    /// The groove that balls run in is not drawn.
     GrooveNotDrawn,
-    /// `projection` where the ring's flank is steep: forces come out too large.
+    /// `projection` with a steep ring flank: forces come out too large.
     ProjectionOnSteepFlank,
-    /// `projection` with a gap, which it does not weigh by the work done.
+    /// `projection` with a gap, which it does not weight by work.
     ProjectionWithGap,
-    /// The carrier's fingers give way by more than can be left out.
+    /// The compliance of the carrier's fingers is too large to neglect.
     SlenderFingers,
-    /// The ring's rim does so.
+    /// The compliance of the ring's rim is too large to neglect.
     SoftRim,
     /// Palmgren's law for a contact that is not steel on steel.
     PalmgrenBeyondSteel,
-    /// Johnson's law for a contact that is wide beside the tooth's radius or the depth.
+    /// Johnson's law for a contact that is wide compared with the tooth's radius or the depth.
     JohnsonBeyondHalfWidth,
-    /// A wind-up so large that the teeth no longer stand where the model has them.
+    /// Wind-up so large that the teeth are no longer where the model assumes them.
     WindUpBeyondModel,
-    /// Without load the parts interfere on both flanks: the backlash is below zero.
+    /// Unloaded parts interfere on both flanks: the backlash is negative.
     NegativeBacklash,
-    /// A tooth's centre passes the end of its slot's walls, as the carrier is made.
+    /// A tooth's centre passes the end of its slot's walls in the manufactured carrier.
     ToothLeavesSlot,
-    /// A wall of a part as it is made is thin.
+    /// A wall of a manufactured part is thin.
     ThinWallAsMade,
-    /// The ring's flank is undercut only because its clearance sets it back.
+    /// The ring's flank is undercut only because of its clearance.
     ClearanceUndercutsRing,
-    /// Friction beyond the range in which first order was held against exact equilibria.
+    /// Friction outside the range in which the first-order model was compared with exact equilibria.
     FrictionBeyondMeasured,
-    /// Friction so large that an exact equilibrium may have quite another efficiency.
+    /// Friction so large that the efficiency of an exact equilibrium may differ considerably.
     EfficiencyUncertain,
-    /// A load on the wave generator's bearing beyond which the equation of its life does not hold.
+    /// Load on the wave generator's bearing above which its life equation is not valid.
     BearingLoadAboveHalfRating,
-    /// A stress above the one that the contact may have.
+    /// Stress above the contact's allowable stress.
     StressAboveAllowable,
-    /// A stress above the fatigue limit of bearing steel.
+    /// Stress above the fatigue limit of bearing steel.
     StressAboveFatigueLimit,
-    /// A field that a later version will not know.
+    /// Field that a later version will remove.
     DeprecatedField,
-    /// A surface that a clearance and a modification set back.
+    /// Surface set back by both a clearance and a modification.
     SetBackTwice,
 }
 
-/// Something questionable about a drive, its load or its document.
+/// Finding about a drive, its load or its document.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
     /// The kind of finding.
     pub code: FindingCode,
-    /// How grave it is.
+    /// Severity of the finding.
     pub severity: Severity,
-    /// What was found.
+    /// Value that caused the finding.
     pub value: f64,
-    /// What it is measured against.
+    /// Limit of the value.
     pub limit: f64,
-    /// The contact, or the part that teeth touch there, if it is about one.
+    /// Contact, or the part that teeth touch there, if the finding is about one.
     pub contact: Option<Contact>,
 }
 
@@ -167,13 +171,13 @@ impl Finding {
         Self { contact: Some(contact), ..self }
     }
 
-    /// A warning in this case, otherwise information.
+    /// Creates a warning if `is_grave`, otherwise information.
     const fn grave_if(code: FindingCode, value: f64, limit: f64, is_grave: bool) -> Self {
         if is_grave { Self::warning(code, value, limit) } else { Self::info(code, value, limit) }
     }
 }
 
-/// The findings about the drive itself.
+/// Returns the findings about the drive itself.
 ///
 /// # Errors
 /// [`NotConverged`] from the geometry.
@@ -226,7 +230,7 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
         findings.push(Finding::info(Code::HollowWaveGenerator, amplitude_mm, limit_mm));
     }
     if let ToothShape::FlatSided { flat_length_mm, .. } = p.tooth {
-        // The arcs that the flats leave reach as far as the contact with the ring: w/2 ≥ r sin β, that is, l ≤ 2r cos β.
+        // The arcs beside the flats reach the contact with the ring if w/2 ≥ r sin β, that is, l ≤ 2r cos β.
         let limit_mm = 2.0 * p.tooth_radius_mm / tan_pressure_angle.hypot(1.0);
         if flat_length_mm > limit_mm {
             findings.push(Finding::warning(Code::FlatCutsTheContact, flat_length_mm, limit_mm));
@@ -235,7 +239,7 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
     Ok(findings)
 }
 
-/// Where `projection` is far from elastic bodies.
+/// Returns findings if `projection` differs much from elastic bodies.
 ///
 /// # Errors
 /// [`NotConverged`] from the geometry.
@@ -257,7 +261,7 @@ pub fn of_projection(drive: &Drive, load: &LoadCase) -> Result<Vec<Finding>, Not
     Ok(findings)
 }
 
-/// What gives way behind the contacts by more than can be left out.
+/// Returns findings for parts behind the contacts that are too compliant to neglect.
 pub fn of_backing(shares: &Shares) -> Vec<Finding> {
     let soft = shares.shares.iter().filter(|(_, share)| *share > SOFT_BACKING_SHARE);
     let finding = |&(estimate, share): &(Estimate, f64)| {
@@ -273,7 +277,7 @@ pub fn of_backing(shares: &Shares) -> Vec<Finding> {
     soft.filter_map(finding).collect()
 }
 
-/// That the wind-up of a sweep goes beyond what the model holds for.
+/// Returns a finding if the wind-up of a sweep exceeds the model's range.
 pub fn of_wind_up(drive: &Drive, load: &LoadCase, sweep: &Sweep) -> Option<Finding> {
     let wind_up_deg = sweep.input_angles.wind_up_deg.iter().copied().fold(0.0, f64::max);
     let is_moving = load.parameters().wave_generator_moves;
@@ -285,8 +289,8 @@ pub fn of_wind_up(drive: &Drive, load: &LoadCase, sweep: &Sweep) -> Option<Findi
     (wind_up_deg > limit_deg).then_some(Finding::warning(Code::WindUpBeyondModel, wind_up_deg, limit_deg))
 }
 
-/// Interference on both flanks without load. Where a tooth is blocked on a lobe or in a valley, the finding names the
-/// ring, and its value is the gap in µm instead of the backlash in arcmin.
+/// Returns a finding for unloaded interference on both flanks. If a tooth is blocked on a lobe or in a valley, the
+/// finding names the ring. Its value is then the gap in µm instead of the backlash in arcmin.
 pub fn of_backlash(backlash: &Result<Backlash, SolveError>) -> Option<Finding> {
     match *backlash {
         Ok(Backlash { smallest, .. }) => {
@@ -304,12 +308,13 @@ pub fn of_backlash(backlash: &Result<Backlash, SolveError>) -> Option<Finding> {
     }
 }
 
-/// How far first order holds for the friction of a sweep with this mean loss ratio (docs/explanation/theory.md section 10.6).
+/// Returns a finding if first-order friction is not accurate for a sweep with this mean loss ratio
+/// (docs/explanation/theory.md section 10.6).
 pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) -> Option<Finding> {
     let FirstOrderError { efficiency, coefficient, coefficient_along_cam, is_within_measured_range } =
         friction.first_order_error(mechanism, mechanism.loss_share(Fixed::Ring, loss_ratio));
     if !is_within_measured_range {
-        // Beyond, no error is known.
+        // Outside the measured range no error is known.
         let is_along_cam = coefficient <= MEASURED_TO;
         let (coefficient, limit) =
             if is_along_cam { (coefficient_along_cam, MEASURED_TO_ALONG_CAM) } else { (coefficient, MEASURED_TO) };
@@ -322,13 +327,14 @@ pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) 
     ))
 }
 
-/// That the load on a bearing of this rating goes beyond what the equation of its life holds for (docs/explanation/theory.md section 10.5).
+/// Returns a finding if the load on a bearing of this rating exceeds the range of its life equation
+/// (docs/explanation/theory.md section 10.5).
 pub fn of_bearing(dynamic_load_rating_n: f64, load_n: f64) -> Option<Finding> {
     let limit_n = LIFE_HOLDS_TO_SHARE_OF_RATING * dynamic_load_rating_n;
     (load_n > limit_n).then_some(Finding::warning(Code::BearingLoadAboveHalfRating, load_n, limit_n))
 }
 
-/// The findings about the ring as it is made (docs/explanation/theory.md section 8).
+/// Returns the findings about the manufactured ring (docs/explanation/theory.md section 8).
 pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
     let flank = ring.space.set_back_flank();
     let thin = thin_wall(drive, Contact::Ring, ring.outer_radius_mm - ring.space.outermost_radius_mm());
@@ -342,23 +348,24 @@ pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
     findings
 }
 
-/// The findings about the wave generator as it is made; a solid cam has no wall.
+/// Returns the findings about the manufactured wave generator. A solid cam has no wall.
 pub(crate) fn of_wave_generator(drive: &Drive, cam: &WaveGeneratorPart) -> Vec<Finding> {
     let wall_mm = |bore_mm: f64| drive.flank().locus().cam_inner_radius_mm() - cam.set_back_mm - bore_mm;
     let thin = cam.bore_radius_mm.and_then(|bore_mm| thin_wall(drive, Contact::WaveGenerator, wall_mm(bore_mm)));
     thin.into_iter().chain(groove_not_drawn(drive, Contact::WaveGenerator)).collect()
 }
 
-/// The findings about the carrier as it is made: whether its walls reach as far as the teeth's centres go.
+/// Returns the findings about the manufactured carrier: its walls must cover the travel of the teeth's centres.
 ///
 /// # Errors
 /// [`NotConverged`] from the geometry.
 pub(crate) fn of_carrier(drive: &Drive, carrier: &CarrierPart) -> Result<Vec<Finding>, NotConverged> {
     let p = drive.parameters();
     let w = carrier.slot_half_width_mm;
-    // A wall stands w beside the slot's middle, so its ends are nearer to the axis along the slot than their radii.
+    // A wall is at distance w from the slot's middle, so its ends are nearer to the axis along the slot than their
+    // radii.
     let along_slot_mm = |radius_mm: f64| ((radius_mm - w).max(0.0) * (radius_mm + w)).sqrt();
-    // Where slots run into each other the fingers are pointed, and their walls begin at the point.
+    // If slots overlap, the fingers are pointed and their walls begin at the point.
     let point_mm = w / (PI / p.installed as f64).tan();
     let (inner_mm, outer_mm) =
         (along_slot_mm(carrier.inner_radius_mm).max(point_mm), along_slot_mm(carrier.outer_radius_mm));
@@ -379,7 +386,7 @@ pub(crate) fn of_carrier(drive: &Drive, carrier: &CarrierPart) -> Result<Vec<Fin
     Ok(findings)
 }
 
-/// `r_g`, where teeth are balls and this contact has a groove for them.
+/// Returns `r_g` if teeth are balls and this contact has a groove for them.
 const fn groove_radius_mm(drive: &Drive, contact: Contact) -> Option<f64> {
     match &drive.parameters().tooth {
         ToothShape::Ball { groove_radius_mm } => *groove_radius_mm.get(contact),
@@ -387,31 +394,33 @@ const fn groove_radius_mm(drive: &Drive, contact: Contact) -> Option<f64> {
     }
 }
 
-/// The finding, where there is a groove: outlines are drawn without it.
+/// Returns the finding if there is a groove: outlines are drawn without it.
 fn groove_not_drawn(drive: &Drive, contact: Contact) -> Option<Finding> {
     let ball_radius_mm = drive.parameters().tooth_radius_mm;
     let finding = |groove_radius_mm| Finding::info(Code::GrooveNotDrawn, groove_radius_mm, ball_radius_mm).at(contact);
     groove_radius_mm(drive, contact).map(finding)
 }
 
-/// Half the width at its edges of a groove of the radius `r_g` that is `t` deep, `√(t (2r_g - t))`, at most the ball's radius.
+/// Returns half the width at the edges of a groove of radius `r_g` and depth `t`: `√(t (2r_g - t))`, at most the ball's
+/// radius.
 fn groove_half_width_mm(groove_radius_mm: f64, ball_radius_mm: f64) -> f64 {
     let depth_mm = GROOVE_DEPTH_SHARE_OF_BALL * ball_radius_mm;
     (depth_mm * (2.0 * groove_radius_mm - depth_mm)).sqrt().min(ball_radius_mm)
 }
 
-/// The finding, where a wall is thinner than the share of a slot's width that a wall between slots should have too.
+/// Returns the finding if a wall is thinner than the minimum share of a slot's width, as for walls between slots.
 fn thin_wall(drive: &Drive, contact: Contact, wall_mm: f64) -> Option<Finding> {
     let limit_mm = THIN_WALL_SHARE_OF_SLOT * 2.0 * drive.slot_half_width_mm();
     (wall_mm < limit_mm).then_some(Finding::warning(Code::ThinWallAsMade, wall_mm, limit_mm).at(contact))
 }
 
-/// Whether a contact is that of a flat.
+/// True if the contact is that of a flat.
 fn is_flat(drive: &Drive, contact: Contact) -> bool {
     contact == Contact::Carrier && matches!(drive.parameters().tooth, ToothShape::FlatSided { .. })
 }
 
-/// The findings about a drive's contacts under a load. `approaches_matter` where wind-up or clearance was asked for.
+/// Returns the findings about a drive's contacts under a load. `approaches_matter` is true if wind-up or clearance is
+/// computed.
 pub fn of_contacts(
     drive: &Drive,
     load: &LoadCase,
@@ -432,7 +441,7 @@ pub fn of_contacts(
     if p.law == ContactLaw::Palmgren {
         let steel = Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL };
         let steel_mpa = steel.contact_modulus_mpa(Contact::Ring);
-        // A flat has a law of its own, which follows the modulus.
+        // A flat has its own law, which depends on the modulus.
         for (contact, _) in peaks.iter().filter(|&(contact, _)| !is_flat(drive, contact)) {
             let contact_mpa = p.materials.contact_modulus_mpa(contact);
             if (contact_mpa / steel_mpa - 1.0).abs() > STEEL_TOLERANCE {
@@ -456,7 +465,7 @@ pub fn of_contacts(
             peaks
                 .iter()
                 .map(|(contact, peaks)| (contact, peaks.stress_mpa.value, *allowable_mpa.get(contact)))
-                // Of the fatigue limit itself its own finding says the same.
+                // The fatigue limit has its own finding.
                 .filter(|(_, stress_mpa, allowable_mpa)| {
                     stress_mpa > allowable_mpa && allowable_mpa.total_cmp(&FATIGUE_LIMIT_STRESS_MPA).is_ne()
                 })
@@ -473,18 +482,19 @@ pub fn of_contacts(
     findings
 }
 
-/// Half the width of the widest contact of each kind, over all states: it is not the one with the largest stress. Flats are none.
+/// Returns half the width of the widest contact of each kind over all states. It is not the contact with the largest
+/// stress. Flats have none.
 pub(crate) fn widest_half_widths_mm(drive: &Drive, states: &States) -> impl Iterator<Item = (Contact, f64)> {
     let tooth_width_mm = drive.tooth_width_mm();
     states.force_n.iter().filter(|&(contact, _)| !is_flat(drive, contact)).map(move |(contact, forces_n)| {
-        // A corner has no such width, and no stress is told of it.
+        // A corner has no such width, and its stress is not reported.
         let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(_, &stress_mpa)| stress_mpa > 0.0);
         let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));
         (contact, half_widths.fold(0.0, f64::max))
     })
 }
 
-/// The contacts that are too wide for Johnson's law, over all states.
+/// Returns the contacts that are too wide for Johnson's law, over all states.
 pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
     let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
     let tooth_radius_mm = drive.parameters().tooth_radius_mm;
