@@ -1,5 +1,5 @@
-//! How far the model is off elastic bodies: what was measured against finite elements (docs/explanation/validation.md), and whether a drive is one of
-//! those that this speaks for.
+//! Model error relative to elastic bodies, measured with finite elements (docs/explanation/validation.md). It applies
+//! to drives within the measured range.
 
 mod measured;
 
@@ -17,26 +17,27 @@ use crate::root::NotConverged;
 use crate::sweep::Sweep;
 use crate::tooth::line::{WIDE_SHARE, least_length_mm};
 
-/// Lobes of the wave generators that were held against finite elements, at most.
+/// Largest number of wave generator lobes in the finite-element comparison.
 pub const LOBES_TO: u32 = 2;
 
-/// Pressure angle at the ring, at most: case 5.2 has 46.7°.
+/// Largest pressure angle at the ring: case 5.2 has 46.7°.
 pub const PRESSURE_ANGLE_TO_DEG: f64 = 47.0;
 
-/// Gap at a contact, at most.
+/// Largest gap at a contact.
 pub const GAP_TO_UM: f64 = 10.0;
 
-/// The same over the tooth's radius, at most: 10 µm were at teeth of 1.5 mm.
+/// Largest gap divided by the tooth's radius: 10 µm at teeth of 1.5 mm.
 pub const GAP_SHARE_TO: f64 = 0.01 / 1.5;
 
-/// The largest wind-up times the number of lobes, and the same over the period, of natural tips with a gap: the wave generator's arms and the teeth's places are
-/// those of the positions without load, or follow them to second order, and so far both were seen to hold. Without gaps all teeth move on alike, and it matters less.
+/// Largest wind-up times the number of lobes, and divided by the period, for natural tips with a gap. Lever arms and
+/// tooth positions are unloaded or exact to second order, which was verified up to here. Without gaps all teeth move
+/// alike, and it matters less.
 const WIND_UP_TO: WindUpTo = WindUpTo { times_lobes_rad: 0.02, share_of_period: 0.05 };
 
-/// The same of pointed and bored ones.
+/// The same for pointed and bored tips.
 const WIND_UP_AT_POINTED_TIPS_TO: WindUpTo = WindUpTo { times_lobes_rad: 0.031, share_of_period: 0.095 };
 
-/// Where their wind-up is told to be beyond the model.
+/// Limits for drives without gaps: the wind-up at which the finding is reported.
 const WITHOUT_GAPS_TO: WindUpTo =
     WindUpTo { times_lobes_rad: WIND_UP_TIMES_LOBES_RAD, share_of_period: WIND_UP_SHARE_OF_PERIOD };
 
@@ -46,20 +47,20 @@ struct WindUpTo {
     share_of_period: f64,
 }
 
-/// Half the width of the widest contact of all states over the tooth's radius, at most: all drives that were calculated stay below.
+/// Largest half width of a contact over all states, divided by the tooth's radius. All calculated drives are below it.
 pub const HALF_WIDTH_SHARE_TO: f64 = 0.035;
 
-/// How far the moduli of parts may differ to be alike: all bodies were of one steel.
+/// Largest relative difference between moduli that count as equal. All bodies were of the same steel.
 pub const ALIKE: f64 = 0.1;
 
-/// A relative error of the model, `(model - bodies)/bodies`, from the least to the largest that was measured, rounded outward to whole
-/// hundredths.
+/// Range of the relative error of the model, `(model - bodies)/bodies`, from the smallest to the largest measured
+/// value, rounded outward to whole hundredths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct ErrorRange {
-    /// The least; below zero the model says too little.
+    /// Smallest error; negative if the model's value is too small.
     pub low: f64,
-    /// The largest.
+    /// Largest error.
     pub high: f64,
 }
 
@@ -68,43 +69,44 @@ impl ErrorRange {
         Self { low: low as f64 / 100.0, high: high as f64 / 100.0 }
     }
 
-    /// Whether an error lies within.
+    /// True if an error lies within the range.
     pub fn contains(&self, error: f64) -> bool {
         (self.low..=self.high).contains(&error)
     }
 
-    /// The larger of the two errors, without its sign.
+    /// Returns the larger absolute value of the two errors.
     pub const fn largest(&self) -> f64 {
         self.low.abs().max(self.high.abs())
     }
 }
 
-/// What makes cases err alike.
+/// Properties that group cases with equal errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Case {
-    /// Whether any contact has a gap.
+    /// True if any contact has a gap.
     pub has_gaps: bool,
-    /// Whether the ring's tips are pointed or bored, so that its flank ends where a tooth has a lever arm already: such teeth bend.
+    /// True if the ring's tips are pointed or bored. Its flank then ends where a tooth already has a lever arm: such
+    /// teeth bend.
     pub has_pointed_tips: bool,
 }
 
-/// A model, and what makes drives err alike under it.
+/// Model and properties that group drives with equal errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct MeasuredCase {
-    /// The form of compatibility.
+    /// Form of compatibility.
     pub compatibility: Compatibility,
-    /// The contact law.
+    /// Contact law.
     pub law: LawName,
-    /// Whether the ring's teeth bend.
+    /// True if the ring's teeth bend.
     pub ring_teeth_bend: bool,
-    /// Whether the wave generator moves on under its teeth.
+    /// True if the wave generator moves under its teeth.
     pub wave_generator_moves: bool,
-    /// Whether teeth are pressed against the corners of pointed or bored tips.
+    /// True if teeth are pressed against the corners of pointed or bored tips.
     pub corner_contact: bool,
-    /// Whether any contact has a gap.
+    /// True if any contact has a gap.
     pub has_gaps: bool,
-    /// Whether the ring's tips are pointed or bored, so that teeth enter under load.
+    /// True if the ring's tips are pointed or bored, so that teeth enter under load.
     pub has_pointed_tips: bool,
 }
 
@@ -112,79 +114,80 @@ pub struct MeasuredCase {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct Measured {
-    /// Which case.
+    /// The measured case.
     pub case: MeasuredCase,
-    /// Of the largest forces of the contacts.
+    /// Error of the largest forces of the contacts.
     pub force: ErrorRange,
-    /// Of the stresses under them.
+    /// Error of the stresses under these forces.
     pub stress: ErrorRange,
-    /// Of the wind-up, bodies being held at the law's depth; what gives way behind them, rim or fingers, comes on top.
+    /// Error of the wind-up, with bodies held at the law's depth. The compliance behind them, rim or fingers, is added
+    /// to it.
     pub wind_up: ErrorRange,
 }
 
-/// Why a drive is none of those that the measured errors speak for.
+/// Reason why the measured errors do not apply to a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum Beyond {
     /// Stiffnesses of the designer's own, or balls: nothing was measured. Of other laws than Johnson's three drives were, each under one load, and with any
     /// other size or load they err otherwise: their approach grows with another power of the force, or knows no radius, modulus or backing.
     Law,
-    /// Teeth that are no cylinders.
+    /// Teeth that are not cylinders.
     ToothShape,
-    /// More lobes.
+    /// More lobes than measured.
     Lobes,
-    /// A ring with more teeth than the carrier.
+    /// Ring with more teeth than the carrier.
     RingWithMoreTeeth,
-    /// A steeper flank.
+    /// Steeper flank than measured.
     PressureAngle,
     /// Teeth that enter under load: finite elements leave out the angles where one stands on the tip. A real tip takes its load little by little, and the
     /// peak comes out lower. With `corner_contact` those at pointed tips were calculated, not those at bores.
     EntryUnderLoad,
-    /// Parts of unlike moduli.
+    /// Parts with different moduli.
     Materials,
-    /// A larger gap.
+    /// Larger gap than measured.
     Gap,
-    /// A larger wind-up.
+    /// Larger wind-up than measured.
     WindUp,
-    /// Parts made otherwise than conjugate, or single items of them that deviate.
+    /// Parts that are not conjugate by design, or single items with deviations.
     Modification,
-    /// Something that gives way behind a contact.
+    /// Series compliance behind a contact.
     SeriesCompliance,
-    /// A part behind a contact that gives way by more than can be left out, by its estimate, or that has none.
+    /// Part behind a contact whose estimated compliance is too large to neglect, or that has no estimate.
     SoftBacking,
-    /// A wider contact.
+    /// Wider contact than measured.
     HalfWidth,
 }
 
-/// How parts are held that the law takes as held at its depth.
+/// Support of the parts that the law takes as held at its depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum HeldCase {
-    /// A rim in a housing, fingers at both ends; also where `parts` says nothing.
+    /// A rim in a housing, fingers at both ends. Also used if `parts` does not specify it.
     Housed,
-    /// Fingers that are slender though held at both ends.
+    /// Slender fingers held at both ends.
     SlenderFingers,
     /// Fingers held at one end.
     FingersAtOneEnd,
-    /// A rim with nothing around it.
+    /// A rim with no housing.
     FreeRim,
 }
 
-/// How far the wind-up is off for parts that are not held at the law's depth, unless they are given as series compliance.
+/// Wind-up error for parts that are not held at the law's depth, unless they are given as series compliance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct Held {
-    /// How they are held, after `parts`.
+    /// Support of the parts, from `parts`.
     pub case: HeldCase,
-    /// What earlier calculations of elastic bodies held so found; left out where there were none.
+    /// Error found in earlier calculations of elastic bodies held so; left out if there were none.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub wind_up: Option<ErrorRange>,
-    /// What the estimates of this design's own parts come to, of that part of the wind-up which the load adds to what gaps leave.
+    /// Estimated error from this design's own parts, relative to the wind-up that the load adds to that of the gaps.
     pub estimated_wind_up: f64,
 }
 
 impl Held {
-    /// Of parts that have estimates.
+    /// Returns the error for parts that have estimates.
     fn of(support: &Support, shares: &Shares) -> Option<Self> {
         if shares.shares.is_empty() {
             return None;
@@ -209,19 +212,19 @@ impl Held {
     }
 }
 
-/// How far the drives went that were calculated: cylinders of steel in a ring with fewer teeth.
+/// Range of the calculated drives: steel cylinders in a ring with fewer teeth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct MeasuredRange {
-    /// Most lobes.
+    /// Largest number of lobes.
     pub lobes: u32,
     /// Largest pressure angle of the ring's flank.
     pub pressure_angle_deg: f64,
     /// Largest gap of a contact, for teeth of this size.
     pub gap_um: f64,
-    /// Largest wind-up, for so many lobes and teeth, such tips, and gaps or none.
+    /// Largest wind-up for this number of lobes and teeth, this tip shape, and gaps or none.
     pub wind_up_deg: f64,
-    /// Half of the largest width of a contact, over the tooth's radius; less where the law's own limit comes before.
+    /// Largest half width of a contact divided by the tooth's radius. It is less if the law's own limit is lower.
     pub half_width_over_tooth_radius: f64,
 }
 
@@ -234,7 +237,7 @@ impl MeasuredRange {
             (true, true) => WIND_UP_AT_POINTED_TIPS_TO,
         };
         let by_lobes_deg = (to.times_lobes_rad / f64::from(drive.lobes())).to_degrees();
-        // Where the law itself is told to end before.
+        // The law's own limit may be lower.
         let of_law = match law {
             ContactLaw::Johnson { depth_mm } => PerContact::of(|contact| {
                 WIDE_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm) / tooth_radius_mm
@@ -253,29 +256,30 @@ impl MeasuredRange {
     }
 }
 
-/// The expected error of the model, numerical ones apart: how far it was off elastic bodies, calculated by finite elements, in drives
-/// of the same case (docs/explanation/validation.md).
+/// Expected error of the model, without numerical errors: its difference to elastic bodies, calculated by finite
+/// elements, in drives of the same case (docs/explanation/validation.md).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct ModelError {
-    /// The errors of the case; left out where nothing was measured of the law.
+    /// Errors of the case; left out if the law was not measured.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub measured: Option<Measured>,
-    /// What comes on top of the wind-up's error for what gives way behind the contacts, of cylinders under `virtual_work` with `johnson`.
+    /// Additional wind-up error from the compliance behind the contacts, for cylinders under `virtual_work` with
+    /// `johnson`.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub held: Option<Held>,
-    /// The range of the drives that were calculated.
+    /// Range of the calculated drives.
     pub range: MeasuredRange,
-    /// Whether this design lies within.
+    /// True if this design is in the range.
     pub is_within: bool,
-    /// Why it does not.
+    /// Reasons why it is not.
     pub beyond: Vec<Beyond>,
 }
 
-/// Errors that were found of a case, in per cent.
+/// Measured errors of a case, in per cent.
 struct Row {
     case: MeasuredCase,
-    /// Of force, stress and wind-up.
+    /// Errors of force, stress and wind-up.
     percent: [[i32; 2]; 3],
 }
 
@@ -312,24 +316,24 @@ pub fn measured(load: &LoadParameters, Case { has_gaps, has_pointed_tips }: Case
         has_gaps,
         has_pointed_tips,
     };
-    // Corners are met at pointed tips alone.
+    // Corners are touched at pointed tips only.
     let wanted = MeasuredCase { corner_contact: corner_contact && has_pointed_tips, ..case };
     let [force, stress, wind_up] =
         MEASURED.iter().find(|row| row.case == wanted)?.percent.map(|[low, high]| ErrorRange::percent(low, high));
     Some(Measured { case, force, stress, wind_up })
 }
 
-/// Whether the ring's tips are pointed or bored.
+/// True if the ring's tips are pointed or bored.
 pub fn has_pointed_tips(drive: &Drive) -> bool {
     drive.flank_limit().end != FlankEnd::RegularTip
 }
 
-/// The case of a drive under a load.
+/// Returns the case of a drive under a load.
 pub fn case_of(drive: &Drive, load: &LoadCase, deviations: &Deviations) -> Case {
     Case { has_gaps: load.has_gaps() || !deviations.is_nil(), has_pointed_tips: has_pointed_tips(drive) }
 }
 
-/// What is expected of the model for this drive, load and sweep, with parts that are held so and add these shares.
+/// Returns the expected model error for this drive, load and sweep, with parts of this support and these shares.
 ///
 /// # Errors
 /// [`NotConverged`] from the geometry.
@@ -349,7 +353,7 @@ pub fn of(
     let mates = [&p.materials.wave_generator, &p.materials.ring, &p.materials.carrier];
     let tooth_radius_mm = drive.parameters().tooth_radius_mm;
     let range = MeasuredRange::of(drive, &p.law, case);
-    // Slots that run into each other leave no finger that could be estimated.
+    // Overlapping slots leave no finger to estimate.
     let has_estimate = |shares: &Shares, contact: Contact| {
         *p.series_compliance_mm_per_n.get(contact) > 0.0
             || shares.shares.iter().any(|(estimate, _)| estimate.backing.contact() == contact)
@@ -358,7 +362,8 @@ pub fn of(
         shares.shares.iter().any(|(_, share)| *share > SOFT_BACKING_SHARE)
             || ![Contact::Ring, Contact::Carrier].into_iter().all(|contact| has_estimate(shares, contact))
     };
-    // Of lines the widest is not the one with the largest stress; flats and the ellipses of balls are known at their peaks alone.
+    // For line contacts the widest is not the one with the largest stress. Flats and the ellipses of balls are known
+    // only at their peaks.
     let at_peaks = sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm);
     let of_lines = widest_half_widths_mm(drive, &sweep.states).map(|(_, half_width_mm)| half_width_mm);
     let widest_mm = at_peaks.chain(of_lines).fold(0.0, f64::max);
