@@ -1,27 +1,28 @@
-//! Curves as few arcs with one tangent where they meet, for what draws in lines and arcs (docs/explanation/theory.md section 8).
+//! Approximation of curves by few arcs with common tangents, for formats with lines and arcs only
+//! (docs/explanation/theory.md section 8).
 
 use nalgebra::{Point2, Unit, Vector2};
 
 use crate::profile::SampledCurve;
 use crate::spline;
 
-/// How near to an arc the points of a curve have to be, as a share of the tolerance: what is left is for the curve between two points, which are
-/// so dense that it leaves their chord by a sixteenth of the tolerance about.
+/// Largest distance between an arc and the points of a curve, as a share of the tolerance. The rest is for the curve
+/// between two points, which differs from their chord by about a sixteenth of the tolerance.
 const SHARE_AT_POINTS: f64 = 0.9;
 
-/// Bulge of a quarter of a circle, the largest that is drawn.
+/// Largest bulge that is drawn: a quarter of a circle.
 const GREATEST_BULGE: f64 = std::f64::consts::SQRT_2 - 1.0;
 
-/// An arc, which ends where the next one starts.
+/// Start of an arc, which ends at the start of the next one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArcStart {
-    /// Where it starts.
+    /// Start point.
     pub point: Point2<f64>,
-    /// Tangent of a quarter of its angle, counter-clockwise positive; 0 is a line.
+    /// Tangent of a quarter of the arc's angle, counter-clockwise positive; 0 is a line.
     pub bulge: f64,
 }
 
-/// Arcs along a curve, within a tolerance of it.
+/// Returns arcs along a curve, within a tolerance of it.
 pub(crate) fn arcs(curve: &SampledCurve, tolerance_mm: f64) -> Vec<ArcStart> {
     let SampledCurve { points, tangents } = curve;
     let biarc = |from: usize, to: usize| Biarc::new([points[from], points[to]], [tangents[from], tangents[to]]);
@@ -38,22 +39,22 @@ pub(crate) fn arcs(curve: &SampledCurve, tolerance_mm: f64) -> Vec<ArcStart> {
     ends.windows(2).flat_map(of_piece).collect()
 }
 
-/// Two arcs from one point and direction to another, with tangents of equal length.
+/// Biarc: two arcs between two points with given directions, with tangents of equal length.
 struct Biarc {
     ends: [Point2<f64>; 2],
     tangents: [Unit<Vector2<f64>>; 2],
     joint: Point2<f64>,
-    /// At the joint, of any length.
+    /// Tangent direction at the joint, of any length.
     along: Vector2<f64>,
 }
 
 impl Biarc {
-    /// None where the ends' directions are so far from their chord that an arc would be more than a quarter of a circle.
+    /// Returns the biarc. None if an arc would be more than a quarter of a circle.
     fn new(ends: [Point2<f64>; 2], tangents: [Unit<Vector2<f64>>; 2]) -> Option<Self> {
         let [start, end] = ends;
         let [from, to] = tangents.map(Unit::into_inner);
         let chord = end - start;
-        // The length d of the tangents from `|chord - d (from + to)| = 2 d`.
+        // The length d of the tangents follows from `|chord - d (from + to)| = 2 d`.
         let along = chord.dot(&(from + to));
         let reach_mm = chord.norm_squared() / (along + along.hypot((to - from).norm() * chord.norm()));
         let [before, behind] = [start + reach_mm * from, end - reach_mm * to];
@@ -64,7 +65,7 @@ impl Biarc {
     fn arcs(&self) -> [ArcStart; 2] {
         let [start, end] = self.ends;
         let [from, to] = &self.tangents;
-        // A quarter of an arc's angle is half of that between chord and tangent.
+        // A quarter of an arc's angle is half of the angle between chord and tangent.
         let [first, second] = [self.joint - start, end - self.joint];
         let bulge = |chord: Vector2<f64>, sine: f64, tangent: &Vector2<f64>| sine / (chord.norm() + chord.dot(tangent));
         [
@@ -73,14 +74,15 @@ impl Biarc {
         ]
     }
 
-    /// How far a point beside them is from the circle of the nearer arc.
+    /// Returns the distance of a point from the circle of the nearer arc.
     fn distance_mm(&self, point: Point2<f64>) -> f64 {
         let end = usize::from((point - self.joint).dot(&self.along) > 0.0);
         let tangent = &self.tangents[end];
         let chord = self.joint - self.ends[end];
         let curvature = 2.0 * tangent.perp(&chord) / chord.norm_squared();
         let off = point - self.ends[end];
-        // On a circle through the end `tangent × off = curvature off²/2`; from it the distance, free of cancellation for a flat one.
+        // On a circle through the end, `tangent × off = curvature off²/2`. The distance from it has no cancellation for
+        // a flat arc.
         let excess_mm = tangent.perp(&off) - 0.5 * curvature * off.norm_squared();
         2.0 * excess_mm.abs() / (1.0 + (1.0 - 2.0 * curvature * excess_mm).max(0.0).sqrt())
     }

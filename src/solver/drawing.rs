@@ -1,5 +1,5 @@
-//! The parts' sections in the plane, as outlines of lines, arcs and sampled curves, and where each stands in the assembly
-//! (docs/explanation/theory.md section 8).
+//! Sections of the parts in the plane, as outlines of lines, arcs and sampled curves, and their placements in the
+//! assembly (docs/explanation/theory.md section 8).
 
 use std::f64::consts::PI;
 
@@ -24,48 +24,48 @@ use crate::tooth_space::HalfSpace;
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, Stop};
 
-/// What is drawn.
+/// Subject of a drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Subject {
     /// One part in its own frame.
     Part(Part),
-    /// All of them in the ring's frame, at an input angle.
+    /// All parts in the ring's frame, at an input angle.
     Assembly,
 }
 
-/// Where a section stands: turned about its origin, then moved.
+/// Placement of a section: rotated about its origin, then moved.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Placement {
-    /// Where its origin goes.
+    /// Position of its origin.
     pub origin_mm: Point2<f64>,
-    /// How far it is turned, counter-clockwise.
+    /// Rotation, counter-clockwise.
     pub rotation_rad: f64,
 }
 
-/// A part as prisms of one section: one, or, of teeth and of the fingers between the carrier's slots, several alike.
+/// Part as prisms of one section. Teeth and the fingers between the carrier's slots have several placements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
-    /// Which part.
+    /// The part.
     pub part: Part,
-    /// The section of each.
+    /// Section of each prism.
     pub section: Section,
-    /// Where each stands.
+    /// Placement of each prism.
     pub placements: Vec<Placement>,
 }
 
-/// What a drawing is asked for.
+/// Parameters of a drawing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrawingParameters {
-    /// How far a chord may be from its curve.
+    /// Largest distance of a chord from its curve.
     pub chord_tolerance_mm: f64,
-    /// How many points at most, over all curves of one section.
+    /// Largest number of points over all curves of one section.
     pub max_points: u64,
-    /// Angle of the wave generator; only an assembly reads it.
+    /// Angle of the wave generator, used only for an assembly.
     pub input_angle_deg: f64,
 }
 
 impl Subject {
-    /// The parts that are drawn, from the outside in.
+    /// Returns the drawn parts, from the outside in.
     pub const fn parts(&self) -> &[Part] {
         match self {
             Self::Part(part) => std::slice::from_ref(part),
@@ -75,7 +75,7 @@ impl Subject {
 }
 
 impl DrawingParameters {
-    /// The values that are out of their ranges.
+    /// Returns the values outside their ranges.
     fn violations(&self, subject: Subject) -> Vec<Violation> {
         let input_angle = match subject {
             Subject::Part(_) => None,
@@ -85,7 +85,7 @@ impl DrawingParameters {
     }
 }
 
-/// A drawing that can be made.
+/// Checked drawing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
     drive: Drive,
@@ -104,10 +104,10 @@ enum MadePart {
 }
 
 impl Drawing {
-    /// Checks the parameters of what is drawn.
+    /// Checks the parameters of the subject.
     ///
     /// # Errors
-    /// Every reason why it cannot be made, those of the drive among them.
+    /// Every reason why it cannot be made, including those of the drive.
     pub fn new(
         draft: &Draft,
         subject: Subject,
@@ -133,12 +133,12 @@ impl Drawing {
         Ok(Self { drive, parts, carrier_rotation_rad, subject, parameters: *parameters })
     }
 
-    /// The drive.
+    /// Returns the drive.
     pub const fn drive(&self) -> &Drive {
         &self.drive
     }
 
-    /// What a designer should be told about the parts as they are made, those that are drawn.
+    /// Returns the findings about the drawn parts as manufactured.
     ///
     /// # Errors
     /// [`NotConverged`] from the geometry.
@@ -153,7 +153,8 @@ impl Drawing {
         Ok(findings.concat())
     }
 
-    /// About how many points its curves have: no fewer, and some times as many.
+    /// Returns the approximate number of curve points. The true number is at least this, and may be several times
+    /// larger.
     pub fn expected_points(&self) -> u64 {
         let has_curves = |part: &MadePart| match part {
             MadePart::Ring(_) => true,
@@ -167,7 +168,7 @@ impl Drawing {
         expected_points(&self.drive, &ProfileParameters { chord_tolerance_mm, extent: Extent::Full, max_points })
     }
 
-    /// Draws.
+    /// Draws the parts.
     ///
     /// # Errors
     /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
@@ -185,7 +186,8 @@ impl Drawing {
         Ok(Body { part, section, placements: self.placements(part)? })
     }
 
-    /// The ring: a circle outside, inside its tooth spaces, from tip to tip each, with the lands between that bored or turned flanks leave.
+    /// Returns the section of the ring: a circle outside, tooth spaces from tip to tip inside. Bored or rotated flanks
+    /// leave lands between these.
     fn ring_section(&self, ring: &RingPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
         let mut half = ring.space.half(self.density(), stop)?;
@@ -196,7 +198,7 @@ impl Drawing {
         if !tip.has_land
             && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
         {
-            // Both flanks end on the symmetry line; there the tip is a point, or regular.
+            // Both flanks end on the symmetry line, where the tip is a point or smooth.
             *end = Point2::from(tip.radius_mm * Vector2::new(tip_rad.cos(), tip_rad.sin()));
         }
         let land_rad = match half.pieces.last().and_then(|piece| piece.points.last()) {
@@ -222,7 +224,7 @@ impl Drawing {
         Ok(Section { outer: Outline::circle(ring.outer_radius_mm), holes: vec![Outline::Edges(edges)] })
     }
 
-    /// The wave generator: an eccentric circle, or a curve from each lobe to each valley and on.
+    /// Returns the section of the wave generator: an eccentric circle, or a curve between all lobes and valleys.
     fn cam_section(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Section, SolveError> {
         let outer = match self.cam_circle(cam) {
             Some(circle) => circle,
@@ -231,7 +233,7 @@ impl Drawing {
         Ok(Section { outer, holes: cam.bore_radius_mm.map(Outline::circle).into_iter().collect() })
     }
 
-    /// The outline of an eccentric, whose lobe is along x.
+    /// Returns the outline of an eccentric with its lobe along x.
     fn cam_circle(&self, cam: &WaveGeneratorPart) -> Option<Outline> {
         match self.drive.flank().locus().cam() {
             Cam::Harmonic(harmonic) if harmonic.is_circle() => Some(Outline::Circle {
@@ -249,12 +251,13 @@ impl Drawing {
         self.require_points(u64::from(2 * lobes) * half as u64)?;
         let points = ends_of_chords(&half_lobe.points);
         let whole = cam_outline(&points, lobes);
-        // The poles likewise, each polygon's last one the next one's first, so that they start and end in the outline's very points.
+        // The same for the control points: the last of each polygon is the first of the next, so that they start and
+        // end exactly at the outline's points.
         let polygons = spline::polygons(&half_lobe, SPLINE_SHARE_OF_CHORD * self.parameters.chord_tolerance_mm);
         let degrees: Vec<_> = polygons.iter().map(|polygon| polygon.len() - 1).collect();
         let poles = polygons.iter().flat_map(|polygon| &polygon[1..]);
         let whole_polygon = cam_outline(&points[..1].iter().chain(poles).copied().collect(), lobes);
-        // Where a lobe or a valley lies the tangent stands across the radius.
+        // At a lobe or a valley the tangent is perpendicular to the radius.
         let across = |end: u32| {
             let radial = direction(end, 2 * lobes);
             Unit::new_unchecked(Vector2::new(0.0 - radial.y, radial.x))
@@ -272,7 +275,7 @@ impl Drawing {
             };
             degrees.into_iter().map(polygon).collect()
         };
-        // And the arcs, whose angles are the same from either end.
+        // The same for the arcs, whose angles are equal from both ends.
         let half_arcs = arcs::arcs(&half_lobe, self.parameters.chord_tolerance_mm);
         let corners: Polyline = half_arcs.iter().map(|arc| arc.point).chain(half_lobe.points.last().copied()).collect();
         let whole_corners = cam_outline(&corners, lobes);
@@ -295,16 +298,15 @@ impl Drawing {
         Ok(edges.collect())
     }
 
-    /// One finger of the carrier: what stands between slot 0, along x, and slot 1. Where the slots run into each other
-    /// beyond the inner radius it is pointed.
+    /// Returns one finger of the carrier, between slot 0, along x, and slot 1. It is pointed if the slots overlap
+    /// beyond the inner radius.
     fn carrier_section(&self, carrier: &CarrierPart) -> Section {
         Section { outer: Outline::Edges(finger(&self.drive, carrier)), holes: Vec::new() }
     }
 
-    /// Where the prisms of a part stand: in the ring's frame for an assembly, in its own otherwise.
-    ///
-    /// The carrier turns by `j (Z_G - Z_K)/Z_G` and tooth i stands in slot i, at `ψ_i = i 2π/Z'_G - j Z_K/Z_G` from the first lobe
-    /// (docs/explanation/theory.md section 3).
+    /// Returns the placements of a part's prisms: in the ring's frame for an assembly, otherwise in its own. The
+    /// carrier rotates by `j (Z_G - Z_K)/Z_G`. Tooth i is in slot i, at `ψ_i = i 2π/Z'_G - j Z_K/Z_G` from the first
+    /// lobe (docs/explanation/theory.md section 3).
     fn placements(&self, part: Part) -> Result<Vec<Placement>, SolveError> {
         let p = self.drive.parameters();
         let input_turns = match self.subject {
@@ -314,7 +316,7 @@ impl Drawing {
         let turned =
             |turns: f64| Placement { origin_mm: Point2::origin(), rotation_rad: 2.0 * PI * turns.rem_euclid(1.0) };
         let carrier_turns = input_turns / self.drive.transmission_ratio();
-        // A carrier that is turned away from the flank under load stands a little further on than its teeth.
+        // A carrier that is rotated away from the flank under load is slightly ahead of its teeth.
         let turned_away = match self.subject {
             Subject::Part(_) => 0.0,
             Subject::Assembly => self.drive.sense() * self.carrier_rotation_rad / (2.0 * PI),
@@ -353,7 +355,7 @@ impl Drawing {
     }
 }
 
-/// A tooth space of the ring, its middle along x, from tip to tip.
+/// Returns a tooth space of the ring from tip to tip, with its middle along x.
 fn tooth_space(half: HalfSpace, chord_tolerance_mm: f64) -> Vec<Edge> {
     let root_arc_rad = half.root_arc_rad;
     let mut edges: Vec<_> = flanks(half).iter().map(|flank| Edge::curve(flank, chord_tolerance_mm)).collect();
@@ -366,7 +368,7 @@ fn tooth_space(half: HalfSpace, chord_tolerance_mm: f64) -> Vec<Edge> {
     edges
 }
 
-/// The flanks of a tooth space from tip to tip, one curve where they are smooth at the root.
+/// Returns the flanks of a tooth space from tip to tip. They are one curve if they are smooth at the root.
 fn flanks(half: HalfSpace) -> Vec<SampledCurve> {
     let HalfSpace { root_arc_rad, is_smooth_at_root, mut pieces } = half;
     if let Some(first) = pieces.first_mut().and_then(|piece| piece.points.first_mut())
@@ -393,7 +395,7 @@ fn flanks(half: HalfSpace) -> Vec<SampledCurve> {
     curves
 }
 
-/// A tooth: a circle, or, with flats on the walls of its slot, which runs along x, two arcs joined by lines.
+/// Returns the section of a tooth: a circle, or two arcs joined by flats parallel to its slot, which is along x.
 fn tooth_section(tooth: &ToothPart) -> Section {
     let ToothPart { radius_mm, half_width_mm } = *tooth;
     let outer = if half_width_mm < radius_mm {
@@ -414,18 +416,18 @@ fn tooth_section(tooth: &ToothPart) -> Section {
     Section { outer, holes: Vec::new() }
 }
 
-/// The finger between slots 0 and 1 of the carrier that fills the annulus which the mechanics leave it: from the cam's major axis to
-/// the ring's tips, with slots as wide as a tooth (docs/explanation/theory.md sections 7 and 8). None where nothing is left.
+/// Returns the finger between slots 0 and 1 of the widest possible carrier: from the cam's major axis to the ring's
+/// tips, with slots as wide as a tooth (docs/explanation/theory.md sections 7 and 8). None if there is no space.
 pub fn widest_finger(drive: &Drive) -> Option<Vec<Edge>> {
     CarrierPart::widest(drive).map(|carrier| finger(drive, &carrier))
 }
 
-/// A finger of the carrier, between the walls of slots 0 and 1.
+/// Returns a finger of the carrier, between the walls of slots 0 and 1.
 fn finger(drive: &Drive, carrier: &CarrierPart) -> Vec<Edge> {
     let CarrierPart { inner_radius_mm, outer_radius_mm, slot_half_width_mm: wall } = *carrier;
     let half_spacing_rad = PI / drive.parameters().installed as f64;
     let to_next = Rotation2::new(2.0 * half_spacing_rad);
-    // On the wall of slot 0 at a radius, and its mirror image on the near wall of slot 1.
+    // Point on the wall of slot 0 at a radius; its mirror image is on the near wall of slot 1.
     let on_wall = |radius_mm: f64| Point2::new(((radius_mm - wall) * (radius_mm + wall)).sqrt(), wall);
     let on_next = |point: Point2<f64>| to_next * Point2::new(point.x, -point.y);
     let sweep_rad = |radius_mm: f64| 2.0 * (half_spacing_rad - (wall / radius_mm).asin());

@@ -94,9 +94,9 @@ pub struct Case {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct MeasuredCase {
-    /// Form of compatibility.
+    /// The form of compatibility.
     pub compatibility: Compatibility,
-    /// Contact law.
+    /// The contact law.
     pub law: LawName,
     /// True if the ring's teeth bend.
     pub ring_teeth_bend: bool,
@@ -129,8 +129,9 @@ pub struct Measured {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum Beyond {
-    /// Stiffnesses of the designer's own, or balls: nothing was measured. Of other laws than Johnson's three drives were, each under one load, and with any
-    /// other size or load they err otherwise: their approach grows with another power of the force, or knows no radius, modulus or backing.
+    /// User-defined stiffnesses, or balls: nothing was measured. Three drives were measured with laws other than
+    /// Johnson's, each under one load. At other sizes or loads these laws have other errors: their approach grows with
+    /// another power of the force, or does not depend on radius, modulus or backing.
     Law,
     /// Teeth that are not cylinders.
     ToothShape,
@@ -140,8 +141,9 @@ pub enum Beyond {
     RingWithMoreTeeth,
     /// Steeper flank than measured.
     PressureAngle,
-    /// Teeth that enter under load: finite elements leave out the angles where one stands on the tip. A real tip takes its load little by little, and the
-    /// peak comes out lower. With `corner_contact` those at pointed tips were calculated, not those at bores.
+    /// Teeth that enter under load: finite elements leave out the angles where a tooth stands on the tip. A real tip
+    /// takes its load gradually, and the peak is lower. With `corner_contact` those at pointed tips were calculated,
+    /// not those at bores.
     EntryUnderLoad,
     /// Parts with different moduli.
     Materials,

@@ -6,50 +6,50 @@ use crate::arcs::{self, ArcStart};
 use crate::profile::{Polyline, SampledCurve};
 use crate::spline;
 
-/// How far polynomials may be from their curve, as a share of the chord tolerance: as little as solids of tolerance 1e-3 mm need to touch each other
-/// within 10 nm.
+/// Largest distance of polynomials from their curve, as a share of the chord tolerance. With it, solids of tolerance
+/// 1e-3 mm touch each other within 10 nm.
 pub const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
 
-/// Points for each chord of the drawing that polynomials are laid through and held against: where a tip bends most, points that only just carry chords
-/// do not tell what the curve does between them.
+/// Curve points per chord of the drawing, used to fit and check polynomials. Where a tip bends most, the chord points
+/// alone are too few to define the curve between them.
 pub(crate) const POINTS_PER_CHORD: u32 = 4;
 
-/// A closed path. Each edge starts at the very point where the one before ends, the first where the last ends.
+/// Closed path. Each edge starts exactly at the end point of the edge before, the first at that of the last.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outline {
     /// A circle.
     Circle {
-        /// Its centre.
+        /// Centre of the circle.
         center: Point2<f64>,
-        /// Its radius.
+        /// Radius of the circle.
         radius_mm: f64,
     },
-    /// Edges, counter-clockwise.
+    /// Edges, in counter-clockwise order.
     Edges(Vec<Edge>),
 }
 
-/// A piece of an outline.
+/// Edge of an outline.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Edge {
     /// A straight line.
     Line {
-        /// Where it starts.
+        /// Start point.
         start: Point2<f64>,
-        /// Where it ends.
+        /// End point.
         end: Point2<f64>,
     },
     /// An arc of a circle around the origin.
     Arc {
-        /// Where it starts.
+        /// Start point.
         start: Point2<f64>,
-        /// Where it ends.
+        /// End point.
         end: Point2<f64>,
         /// Radius of the circle.
         radius_mm: f64,
-        /// Its angle, counter-clockwise positive, within a full turn.
+        /// Angle of the arc, counter-clockwise positive, at most one full turn.
         sweep_rad: f64,
     },
-    /// A smooth curve through points that are exact, its chords true to the tolerance.
+    /// A smooth curve through exact points, with chords within the tolerance.
     Curve {
         /// The points, both ends included.
         points: Polyline,
@@ -57,16 +57,16 @@ pub enum Edge {
         start_tangent: Unit<Vector2<f64>>,
         /// Direction at the last point.
         end_tangent: Unit<Vector2<f64>>,
-        /// Bézier's polygons of polynomials that follow each other along it with one tangent, within [`SPLINE_SHARE_OF_CHORD`] of the
-        /// tolerance.
+        /// Control polygons of consecutive Bézier polynomials with a common tangent, within [`SPLINE_SHARE_OF_CHORD`]
+        /// of the tolerance.
         polynomials: Vec<Polyline>,
-        /// Arcs that follow each other along it with one tangent, within the tolerance.
+        /// Consecutive arcs with a common tangent, within the tolerance.
         arcs: Vec<ArcStart>,
     },
 }
 
 impl Edge {
-    /// Where it starts.
+    /// Returns the start point.
     pub fn start(&self) -> Point2<f64> {
         match self {
             Self::Line { start, .. } | Self::Arc { start, .. } => *start,
@@ -74,7 +74,7 @@ impl Edge {
         }
     }
 
-    /// Where it ends.
+    /// Returns the end point.
     pub fn end(&self) -> Point2<f64> {
         match self {
             Self::Line { end, .. } | Self::Arc { end, .. } => *end,
@@ -82,7 +82,7 @@ impl Edge {
         }
     }
 
-    /// The same turned about the origin.
+    /// Returns the edge rotated about the origin.
     pub(crate) fn turned(&self, rotation: &Rotation2<f64>) -> Self {
         let tangent = |tangent: &Unit<Vector2<f64>>| Unit::new_unchecked(rotation * tangent.into_inner());
         let turned = |points: &Polyline| -> Polyline { points.iter().map(|point| rotation * point).collect() };
@@ -101,7 +101,7 @@ impl Edge {
         }
     }
 
-    /// A curve that has [`POINTS_PER_CHORD`].
+    /// Creates a curve from points with [`POINTS_PER_CHORD`].
     pub(crate) fn curve(sampled: &SampledCurve, chord_tolerance_mm: f64) -> Self {
         let SampledCurve { points, tangents } = sampled;
         Self::Curve {
@@ -113,7 +113,7 @@ impl Edge {
         }
     }
 
-    /// Lets a curve end at the very point where the next edge starts.
+    /// Moves the end of a curve exactly to the start of the next edge.
     pub(crate) fn end_at(&mut self, next: Point2<f64>) {
         if let Self::Curve { points, polynomials, .. } = self {
             for polygon in polynomials.last_mut().into_iter().chain([points]) {
@@ -125,22 +125,22 @@ impl Edge {
 }
 
 impl Outline {
-    /// A circle around the origin.
+    /// Returns a circle around the origin.
     pub(crate) const fn circle(radius_mm: f64) -> Self {
         Self::Circle { center: Point2::new(0.0, 0.0), radius_mm }
     }
 }
 
-/// A face: an outline with holes in it.
+/// Face: an outline with holes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Section {
-    /// What bounds it.
+    /// Outer boundary.
     pub outer: Outline,
-    /// What is cut out of it.
+    /// Holes.
     pub holes: Vec<Outline>,
 }
 
-/// Chords of a curve that has [`POINTS_PER_CHORD`].
+/// Returns the number of chords of a curve with [`POINTS_PER_CHORD`].
 pub(crate) const fn chords(points: &Polyline) -> usize {
     (points.len() - 1) / POINTS_PER_CHORD as usize
 }

@@ -1,4 +1,4 @@
-//! Curves as few polynomials, for what draws solids (docs/explanation/theory.md section 8).
+//! Approximation of curves by few polynomials, for solids (docs/explanation/theory.md section 8).
 
 use std::f64::consts::PI;
 
@@ -6,18 +6,19 @@ use nalgebra::{Point2, Vector2};
 
 use crate::profile::{Polyline, SampledCurve};
 
-/// Degree of a polynomial. CAD kernels sum a face's share of a volume over a fixed number of places: OpenCascade over nine, which is exact for
-/// a polynomial of degree 9 at most, and for no curve that is made of several.
+/// Degree of a polynomial. CAD kernels compute a face's share of a volume with a fixed number of quadrature points.
+/// OpenCascade uses nine, which is exact up to degree 9 and inexact for curves of several polynomials.
 const DEGREE: usize = 8;
 
-/// Points between the ends of a polynomial that it goes through; at the ends it has their directions too.
+/// Number of interpolation points between the ends of a polynomial. At the ends it also has their directions.
 const INNER: usize = DEGREE - 3;
 
-/// How many points of a piece are looked at: ten between two that its polynomial goes through.
+/// Number of points of a piece that are checked: ten between two interpolation points.
 const LOOKED_AT: usize = 64;
 
-/// Bézier's polygons of polynomials that follow each other along a densely sampled curve, through points of it and along its tangents,
-/// passing the others within a tolerance: few, each of a low degree, and symmetric where the curve is.
+/// Returns the control polygons of consecutive Bézier polynomials along a densely sampled curve. They interpolate
+/// points and tangents, and pass the other points within a tolerance. They are few, of low degree, and symmetric if the
+/// curve is.
 pub(crate) fn polygons(curve: &SampledCurve, tolerance_mm: f64) -> Vec<Polyline> {
     let measured = MeasuredCurve::new(curve);
     let lowest = |from: usize, to: usize, inner: std::ops::RangeInclusive<usize>| {
@@ -32,8 +33,8 @@ pub(crate) fn polygons(curve: &SampledCurve, tolerance_mm: f64) -> Vec<Polyline>
     ends.windows(2).map(of_piece).collect()
 }
 
-/// Where a curve from its point 0 to its last one is cut into few pieces that may be one, both ends included: the longest from either end, and of the rest
-/// two halves where these may be.
+/// Splits a curve from its point 0 to `last` into few pieces, and returns their ends. It takes the longest possible
+/// piece from each end, then two halves of the rest if these are possible.
 pub(crate) fn ends_of_pieces(last: usize, is_one: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     let (mut from, mut to) = (0, last);
     let mut ends = vec![from, to];
@@ -52,7 +53,7 @@ pub(crate) fn ends_of_pieces(last: usize, is_one: impl Fn(usize, usize) -> bool)
     ends
 }
 
-/// The largest number up to a limit for which something holds, as it does for all smaller ones; one at least.
+/// Returns the largest number up to `limit` for which a monotonic condition holds; at least one.
 fn largest(limit: usize, holds: impl Fn(usize) -> bool) -> usize {
     let (mut good, mut bad) = (1, limit + 1);
     while bad - good > 1 {
@@ -66,7 +67,7 @@ fn largest(limit: usize, holds: impl Fn(usize) -> bool) -> usize {
     good
 }
 
-/// A curve and the length of its arc up to each of its points, which is what its polynomials have for a parameter.
+/// Curve with the arc length up to each of its points, the parameter of its polynomials.
 struct MeasuredCurve<'a> {
     curve: &'a SampledCurve,
     lengths_mm: Vec<f64>,
@@ -81,7 +82,7 @@ impl<'a> MeasuredCurve<'a> {
             let chord_mm = chord.norm();
             if chord_mm > 0.0 {
                 let [a, b] = [0, 1].map(|end| chord.perp(&tangents[end]) / chord_mm);
-                // Of the cubic with these slopes at its ends, to the order of their squares.
+                // Length of the cubic with these end slopes, to second order.
                 length_mm += chord_mm * (1.0 + (2.0 * a * a - a * b + 2.0 * b * b) / 30.0);
             }
             lengths_mm.push(length_mm);
@@ -93,13 +94,13 @@ impl<'a> MeasuredCurve<'a> {
         (self.lengths_mm[point] - self.lengths_mm[from]) / (self.lengths_mm[to] - self.lengths_mm[from])
     }
 
-    /// Points that a polynomial from one point to another goes through: the ends, twice, and some between, those that are nearest to Chebyshev's
-    /// places.
+    /// Returns the interpolation points of a polynomial: both ends twice, and inner points nearest to the Chebyshev
+    /// nodes.
     fn through(&self, from: usize, to: usize, inner: usize) -> Vec<usize> {
         let inner = inner.min(to - from - 1);
         let mut through = vec![from, from];
         for i in 0..inner {
-            // Of all places, the ends being two each.
+            // Among all nodes, with two at each end.
             let wanted = 0.5 - 0.5 * (PI * (i as f64 + 2.5) / (inner as f64 + 4.0)).cos();
             let after = through[through.len() - 1] + 1;
             let latest = to - (inner - i);
@@ -111,11 +112,11 @@ impl<'a> MeasuredCurve<'a> {
         through
     }
 
-    /// Bézier's polygon of the polynomial from one point to another, through some between.
+    /// Returns the Bézier control polygon of the polynomial between two points, through inner points.
     fn polygon(&self, from: usize, to: usize, inner: usize) -> Polyline {
         let SampledCurve { points, tangents } = self.curve;
         let through = self.through(from, to, inner);
-        // Newton's divided differences; where an end stands twice, the derivative there.
+        // Newton's divided differences; at a double node, the derivative.
         let length_mm = self.lengths_mm[to] - self.lengths_mm[from];
         let places: Vec<_> = through.iter().map(|&point| self.share(from, to, point)).collect();
         let mut differences: Vec<_> = through.iter().map(|&point| points[point] - points[from]).collect();
@@ -129,7 +130,8 @@ impl<'a> MeasuredCurve<'a> {
                 };
             }
         }
-        // Horner's scheme among Bézier's polygons: times (t - x), which is -x at the start and 1 - x at the end, and one more.
+        // Horner's scheme on Bézier control polygons: multiply by (t - x), which is -x at the start and 1 - x at the
+        // end, and add one term.
         let mut polygon: Vec<Vector2<f64>> = Vec::new();
         for (x, difference) in places.iter().zip(differences).rev() {
             let degree = polygon.len();
@@ -141,7 +143,7 @@ impl<'a> MeasuredCurve<'a> {
             polygon = (0..=degree).map(raised).collect();
         }
         let mut polygon: Polyline = polygon.into_iter().map(|pole| points[from] + pole).collect();
-        // The corners are shared with what comes before and after.
+        // The end points are shared with the neighbouring polynomials.
         polygon[0] = points[from];
         if let Some(end) = polygon.last_mut() {
             *end = points[to];
@@ -149,7 +151,7 @@ impl<'a> MeasuredCurve<'a> {
         polygon
     }
 
-    /// Whether the points between lie within a tolerance of a polynomial, across the curve.
+    /// True if the points between are within a tolerance of the polynomial, measured across the curve.
     fn is_near(&self, polygon: &Polyline, from: usize, to: usize, tolerance_mm: f64) -> bool {
         let step = (to - from).div_ceil(LOOKED_AT);
         (from + 1..to).step_by(step).all(|point| {
@@ -159,7 +161,7 @@ impl<'a> MeasuredCurve<'a> {
     }
 }
 
-/// A polynomial's point, by de Casteljau.
+/// Returns a point of a polynomial by de Casteljau's algorithm.
 fn at(polygon: &Polyline, share: f64) -> Point2<f64> {
     let mut poles = polygon.clone();
     for last in (1..poles.len()).rev() {
@@ -176,7 +178,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns points on a straight line at the lengths of a function.
+    /// Returns points on a straight line at the lengths given by a function.
     fn line(points: usize, at: impl Fn(f64) -> f64) -> SampledCurve {
         let places = (0..points).map(|i| i as f64 / (points - 1) as f64);
         SampledCurve {
