@@ -1,5 +1,6 @@
-//! What gives way behind the contacts, estimated from the parts as they are made: numbers for `series_compliance_mm_per_n`
-//! (docs/explanation/theory.md section 4.10). They are estimates: what joins the fingers, what holds the rim and what the cam sits on is the designer's.
+//! Estimated compliance of the supports behind the contacts, from the parts' dimensions: values for
+//! `series_compliance_mm_per_n` (docs/explanation/theory.md section 4.10). The designer decides what joins the fingers,
+//! holds the rim and supports the cam.
 
 use std::f64::consts::PI;
 
@@ -10,38 +11,38 @@ use crate::load_sharing::{LoadCase, LoadParameters};
 use crate::parts::{CarrierPart, PartsParameters, RIM};
 use crate::sweep::ContactPeaks;
 
-/// What joins the fingers between the carrier's slots beside the teeth.
+/// Support of the fingers between the carrier's slots, axially outside the teeth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
 pub enum Fingers {
     /// A disc at one end.
     HeldAtOneEnd,
-    /// A disc at either end.
+    /// A disc at each end.
     HeldAtBothEnds,
 }
 
-/// What stands around the ring.
+/// Support of the ring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
 pub enum Rim {
     /// A rigid housing.
     Housed,
-    /// Nothing: it is kept from turning alone.
+    /// No housing: only its rotation is blocked.
     Free,
 }
 
-/// How the parts are held, as far as the designer says.
+/// Support of the parts, as far as the designer specifies it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Support {
-    /// The carrier's fingers.
+    /// Support of the carrier's fingers.
     pub fingers: Option<Fingers>,
-    /// The ring's rim.
+    /// Support of the ring's rim.
     pub rim: Option<Rim>,
 }
 
-/// What gives way.
+/// Compliant part behind a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum Backing {
@@ -49,7 +50,7 @@ pub enum Backing {
     CamOnBore,
     /// The rim in its housing.
     HousedRim,
-    /// The rim with nothing around it.
+    /// The rim with no housing.
     FreeRim,
     /// A finger of the carrier held at both ends.
     FingerAtBothEnds,
@@ -58,7 +59,7 @@ pub enum Backing {
 }
 
 impl Backing {
-    /// The contact that it stands behind.
+    /// Returns the contact that this part is behind.
     pub const fn contact(self) -> Contact {
         match self {
             Self::CamOnBore => Contact::WaveGenerator,
@@ -67,7 +68,7 @@ impl Backing {
         }
     }
 
-    /// Whether a part that is held so has it: where nothing is said, the stiffer of two.
+    /// True if parts with this support include it. If the support is not specified, the stiffer of two applies.
     pub const fn is_of(self, support: &Support) -> bool {
         match self {
             Self::CamOnBore => true,
@@ -79,28 +80,28 @@ impl Backing {
     }
 }
 
-/// An estimate.
+/// Estimated compliance behind a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Of what.
+    /// Compliant part.
     pub backing: Backing,
-    /// How far the contact gives way besides, for each newton there; beyond the depth that the contact's law counts to.
+    /// Additional displacement of the contact per newton, beyond the depth that the contact's law includes.
     pub compliance_mm_per_n: f64,
 }
 
-/// A finger between two slots as a straight beam along the axis, pressed evenly along one wall.
+/// Finger between two slots as a straight beam along the axis, with an even load along one wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FingerBeam {
-    /// Its length, the teeth's width.
+    /// Length: the teeth's width.
     pub length_mm: f64,
-    /// Its thickness across the slots, in the middle of its height.
+    /// Thickness across the slots, at the middle of the height.
     pub thickness_mm: f64,
-    /// Its height along the radius.
+    /// Height along the radius.
     pub height_mm: f64,
 }
 
 impl FingerBeam {
-    /// Of a carrier; none where its slots run into each other in the middle of its height.
+    /// Returns the finger of a carrier. None if its slots overlap at the middle of its height.
     fn of(drive: &Drive, carrier: &CarrierPart) -> Option<Self> {
         let CarrierPart { inner_radius_mm, outer_radius_mm, slot_half_width_mm } = carrier;
         let middle_mm = 0.5 * (inner_radius_mm + outer_radius_mm);
@@ -110,8 +111,8 @@ impl FingerBeam {
         (thickness_mm > 0.0).then_some(Self { length_mm, thickness_mm, height_mm })
     }
 
-    /// Mean deflection along the finger over the force: what a straight tooth on its wall moves by. Bending and shear after Timoshenko, with the
-    /// shear coefficient 5/6 of a rectangle.
+    /// Returns the mean deflection along the finger divided by the force, which is the displacement of a straight tooth
+    /// on its wall. Bending and shear follow Timoshenko, with the shear coefficient 5/6 of a rectangle.
     pub fn compliance_mm_per_n(&self, material: &Material, fingers: Fingers) -> f64 {
         const SHEAR: f64 = 5.0 / 6.0;
         let Self { length_mm, thickness_mm, height_mm } = *self;
@@ -119,7 +120,8 @@ impl FingerBeam {
         let shear_mpa = youngs_mpa / (2.0 * (1.0 + material.poissons_ratio));
         let area_mm2 = thickness_mm * height_mm;
         let inertia_mm4 = area_mm2 * thickness_mm * thickness_mm / 12.0;
-        // The mean of the deflection under an even load: F L³/(20 E I) and F L/(3 κ G A), and between two discs F L³/(720 E I) and F L/(12 κ G A).
+        // Mean deflection under an even load: F L³/(20 E I) and F L/(3 κ G A); between two discs F L³/(720 E I) and F
+        // L/(12 κ G A).
         let (bending, shear) = match fingers {
             Fingers::HeldAtOneEnd => (20.0, 3.0),
             Fingers::HeldAtBothEnds => (720.0, 12.0),
@@ -128,23 +130,23 @@ impl FingerBeam {
     }
 }
 
-/// The ring's rim beyond its tooth spaces as a curved strip, in plane strain.
+/// Ring rim beyond its tooth spaces, as a curved strip in plane strain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RimStrip {
-    /// Where it begins, at the root of the tooth spaces.
+    /// Inner radius: the root of the tooth spaces.
     pub inner_radius_mm: f64,
-    /// Where it ends.
+    /// Outer radius.
     pub outer_radius_mm: f64,
-    /// Its width, that of the teeth.
+    /// Width: that of the teeth.
     pub width_mm: f64,
-    /// Teeth that press it from within, all zones together.
+    /// Number of teeth that load it from within, in all zones together.
     pub teeth: i64,
-    /// Lobes that they are pressed by.
+    /// Number of lobes.
     pub lobes: u32,
 }
 
 impl RimStrip {
-    /// Of the ring as it is made; its flanks' modification is of no weight here.
+    /// Returns the rim of the manufactured ring. Its flank modification is negligible here.
     fn of(drive: &Drive, parts: &PartsParameters) -> Self {
         let inner_radius_mm = drive.root_radius_mm() + MM_PER_UM * parts.ring_clearance_um;
         Self {
@@ -156,11 +158,11 @@ impl RimStrip {
         }
     }
 
-    /// What the rim gives way where nothing holds it, over the force of a tooth: that compliance of each contact which does the work of the whole,
-    /// under forces that go as `sin Uψ` over the half of each lobe on which teeth carry.
+    /// Returns the rim's compliance without a housing, per tooth force. If every contact has this compliance, the work
+    /// equals that of the whole rim. Forces follow `sin Uψ` over the half of each lobe on which teeth carry.
     pub fn free_compliance_mm_per_n(&self, material: &Material) -> f64 {
         const SHEAR: f64 = 5.0 / 6.0;
-        /// Further harmonics of the load bend the strip by less than a thousandth of the first.
+        /// Each further harmonic of the load adds less than a thousandth of the first.
         const HARMONICS: u32 = 8;
         let Self { inner_radius_mm, outer_radius_mm, width_mm, teeth, lobes } = *self;
         let thickness_mm = outer_radius_mm - inner_radius_mm;
@@ -169,7 +171,8 @@ impl RimStrip {
         let shear_mpa = 1e3 * material.youngs_modulus_gpa / (2.0 * (1.0 + material.poissons_ratio));
         let area_mm2 = thickness_mm * width_mm;
         let inertia_mm4 = area_mm2 * thickness_mm * thickness_mm / 12.0;
-        // Half of each lobe's sine is 1/π + (sin Uψ)/2 - (2/π) Σ (cos 2nUψ)/(4n² - 1); the first term stretches the strip.
+        // Half of each lobe's sine is 1/π + (sin Uψ)/2 - (2/π) Σ (cos 2nUψ)/(4n² - 1). The first term stretches the
+        // strip.
         let first = (f64::from(lobes), 0.5);
         let others = (1..=HARMONICS).map(|n| {
             let twice = 2.0 * f64::from(n);
@@ -177,7 +180,7 @@ impl RimStrip {
         });
         let bent = std::iter::once(first).chain(others).map(|(waves, share)| {
             let squared = waves * waves;
-            // One wave pushes the ring aside, which what keeps it in its place takes.
+            // A single wave moves the whole ring, which is the load of its support.
             if squared <= 1.0 {
                 return 0.0;
             }
@@ -192,25 +195,25 @@ impl RimStrip {
     }
 }
 
-/// A body that stands still at its back and is pressed by teeth one beside the other: a rim in its housing, a cam on its bore.
+/// Body with a fixed back that is loaded by neighbouring teeth: a rim in its housing, a cam on its bore.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldStrip {
-    /// How far behind the contacts it is held.
+    /// Depth behind the contacts at which it is held.
     pub depth_mm: f64,
     /// Distance of neighbouring teeth along its surface.
     pub pitch_mm: f64,
-    /// Its width, that of the teeth.
+    /// Width: that of the teeth.
     pub width_mm: f64,
 }
 
 impl HeldStrip {
-    /// What it gives way beyond the depth that a contact's law counts to; less than nothing where it is held nearer than that.
+    /// Returns its compliance beyond the depth that a contact's law includes; negative if it is held nearer than that.
     pub fn compliance_mm_per_n(&self, material: &Material, counted_depth_mm: f64) -> f64 {
         let Self { depth_mm, pitch_mm, width_mm } = *self;
         let nu = material.poissons_ratio;
         let of_material = material.compliance_per_mpa() / (PI * width_mm);
-        // Even pressures a pitch apart: near each its own displacement, from half a pitch on the strip shortens as a whole, without giving way
-        // sideways. A strip that is thinner than half a pitch knows nothing of the neighbours.
+        // Even pressures one pitch apart: each has its own displacement nearby. From half a pitch on, the strip
+        // shortens as a whole, without lateral strain. In a strip thinner than half a pitch, neighbours have no effect.
         let even_mm = depth_mm.max(0.5 * pitch_mm);
         let nearer = 2.0 * (depth_mm / even_mm).ln();
         let near = 2.0 * (pitch_mm / (2.0 * PI * counted_depth_mm)).ln() + 1.0 + nu / (1.0 - nu);
@@ -219,7 +222,7 @@ impl HeldStrip {
     }
 }
 
-/// The parts of a drive as far as they can be made, with what gives way in each.
+/// Compliant parts of a drive, as far as they can be manufactured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Backings {
     finger: Option<FingerBeam>,
@@ -230,7 +233,8 @@ pub struct Backings {
 }
 
 impl Backings {
-    /// Of the parts as they are made and held. Only cylinders, whole or with flats, press their parts along a line.
+    /// Returns the compliant parts as manufactured and supported. Only cylinders, with or without flats, load their
+    /// parts along a line.
     pub fn of(drive: &Drive, draft: &Draft, parts: &PartsParameters, support: Support) -> Self {
         let mut backings = Self { finger: None, rim: None, housed: None, cam: None, support };
         if matches!(drive.parameters().tooth, ToothShape::Ball { .. }) {
@@ -257,12 +261,12 @@ impl Backings {
         backings
     }
 
-    /// How the parts are held.
+    /// Returns the support of the parts.
     pub const fn support(&self) -> &Support {
         &self.support
     }
 
-    /// The estimates; what a body gives way within the depth that its law counts to stands in the law.
+    /// Returns the estimates. The deflection within the depth that a contact's law includes belongs to the law.
     pub fn estimates(&self, drive: &Drive, p: &LoadParameters) -> Vec<Estimate> {
         let counted_mm = |contact| counted_depth_mm(drive, &p.law, contact);
         let held = |strip: Option<HeldStrip>, contact: Contact| {
@@ -278,13 +282,13 @@ impl Backings {
             (Backing::FingerAtOneEnd, finger(Fingers::HeldAtOneEnd)),
         ]
         .into_iter()
-        // A wall of next to nothing gives way without end.
+        // A wall of nearly zero thickness has infinite compliance.
         .filter_map(|(backing, compliance)| Some((backing, compliance.filter(|compliance| compliance.is_finite())?)))
         .map(|(backing, compliance_mm_per_n)| Estimate { backing, compliance_mm_per_n })
         .collect()
     }
 
-    /// The estimates of the parts as they are held, as series compliance; nothing where there is none.
+    /// Returns the estimates for the actual support as series compliance; zero where there is none.
     pub fn series_compliance_mm_per_n(&self, drive: &Drive, p: &LoadParameters) -> PerContact<f64> {
         let estimates = self.estimates(drive, p);
         PerContact::of(|contact| {
@@ -295,7 +299,8 @@ impl Backings {
     }
 }
 
-/// The depth below a contact that its law counts the approach to: Johnson's own, elsewhere the tooth's radius.
+/// Returns the depth below a contact that its law includes in the approach: Johnson's own, otherwise the tooth's
+/// radius.
 fn counted_depth_mm(drive: &Drive, law: &ContactLaw, contact: Contact) -> f64 {
     let of_law = match law {
         ContactLaw::Johnson { depth_mm } => *depth_mm.get(contact),
@@ -304,16 +309,17 @@ fn counted_depth_mm(drive: &Drive, law: &ContactLaw, contact: Contact) -> f64 {
     of_law.unwrap_or(drive.parameters().tooth_radius_mm)
 }
 
-/// What the estimates come to beside the contacts themselves, where these are lines under a law of their own.
+/// Estimates relative to the contact deflection, for line contacts with their own law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shares {
-    /// Those that the drive has as its parts are held, with the share of a tooth's approach at its own contacts that each adds to it.
+    /// Estimates for the drive's support, each with the share that it adds to a tooth's approach at its own contacts.
     pub shares: Vec<(Estimate, f64)>,
 }
 
 impl Shares {
-    /// At the peaks of a load under the logarithmic law; none of other teeth than cylinders, nor under other laws, whose own error is as large. A contact that
-    /// is given a series compliance has its backing in it.
+    /// Returns the shares at the peaks of a load under the logarithmic law. None for teeth that are not cylinders, or
+    /// under other laws, whose own error is as large. A contact with a given series compliance already includes its
+    /// backing.
     pub fn of(drive: &Drive, load: &LoadCase, backings: &Backings, peaks: &PerContact<ContactPeaks>) -> Option<Self> {
         let p = load.parameters();
         let is_line = matches!(drive.parameters().tooth, ToothShape::Cylinder { .. });
@@ -348,14 +354,15 @@ impl Shares {
         Some(Self { shares })
     }
 
-    /// How far the wind-up is off for want of all of them: `1/(1 + Σ) - 1`.
+    /// Returns the wind-up error if all of them are neglected: `1/(1 + Σ) - 1`.
     pub fn wind_up_error(&self) -> f64 {
         let sum: f64 = self.shares.iter().map(|(_, share)| share).sum();
         -sum / (1.0 + sum)
     }
 }
 
-/// A contact's own approach over its force, by the logarithmic law (docs/explanation/theory.md section 4.3).
+/// Returns a contact's own approach divided by its force, by the logarithmic law (docs/explanation/theory.md section
+/// 4.3).
 fn line_compliance_mm_per_n(
     drive: &Drive,
     materials: &Materials,

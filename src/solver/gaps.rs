@@ -1,5 +1,5 @@
-//! Gaps at a tooth's three contacts: what parts that were modified, or came out a little off, leave free (docs/explanation/theory.md section 4.8). Each opens a gap where
-//! it is positive; all are exact to first order in their size, and add up.
+//! Gaps at a tooth's three contacts from modifications and deviations of the parts (docs/explanation/theory.md section
+//! 4.8). A positive value opens a gap. All are exact to first order in their size, and add up.
 
 use std::f64::consts::PI;
 
@@ -13,70 +13,70 @@ use crate::violation::{Listed, Modified, Parameter, Violation};
 pub(crate) const MM_PER_UM: f64 = 1e-3;
 pub(crate) const RAD_PER_ARCSEC: f64 = PI / 648_000.0;
 
-/// Parts made otherwise than conjugate on purpose, all teeth alike. Angles are turned away from the flank under load.
+/// Intended differences from conjugate parts, equal for all teeth. Angles are positive away from the flank under load.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Modification {
-    /// The ring's profile set back along its normals.
+    /// Set-back of the ring's profile along its normals.
     pub ring_equidistant_um: f64,
-    /// The path that generates the ring shifted outward along its radii.
+    /// Outward shift of the path that generates the ring, along its radii.
     pub ring_path_shift_um: f64,
-    /// The ring's profile moved outward along its own radii.
+    /// Outward shift of the ring's profile along its own radii.
     pub ring_profile_shift_um: f64,
-    /// The ring's flanks turned about the axis.
+    /// Rotation of the ring's flanks about the axis.
     pub ring_rotation_arcsec: f64,
-    /// The wave generator set back along its normals.
+    /// Set-back of the wave generator along its normals.
     pub wave_generator_equidistant_um: f64,
-    /// The slots' walls set back.
+    /// Set-back of the slots' walls.
     pub slot_wall_um: f64,
-    /// The carrier turned about the axis.
+    /// Rotation of the carrier about the axis.
     pub carrier_rotation_arcsec: f64,
-    /// The teeth thinner in their radius.
+    /// Reduction of the tooth radius.
     pub tooth_radius_um: f64,
-    /// The ring's flank set back towards its tip.
+    /// Set-back of the ring's flank towards its tip.
     pub ring_tip_relief: Option<TipRelief>,
 }
 
-/// `C ((ψ - ψ_t)/(ψ_e - ψ_t))^n` beyond ψ_t.
+/// Tip relief: `C ((ψ - ψ_t)/(ψ_e - ψ_t))^n` beyond ψ_t.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipRelief {
-    /// `C`, at the flank's end.
+    /// `C`: relief at the flank's end.
     pub amount_um: f64,
-    /// `ψ_t`, where it starts.
+    /// `ψ_t`: position where the relief starts.
     pub start_deg: f64,
-    /// `n`.
+    /// `n`: exponent.
     pub power: f64,
 }
 
-/// What a drive that was measured, or drawn by lot, has at each of its items; an empty list is one of zeros.
+/// Deviations of each item of a measured or randomly generated drive. An empty list means zeros.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Deviations {
-    /// Teeth thinner in their radius, by slot.
+    /// Reduction of the tooth radius, by slot.
     pub tooth_radius_um: Vec<f64>,
-    /// Slots turned away, by slot.
+    /// Rotation of the slots away from the flank under load, by slot.
     pub slot_angle_arcsec: Vec<f64>,
-    /// Walls set back, by slot.
+    /// Set-back of the slot walls, by slot.
     pub slot_wall_um: Vec<f64>,
-    /// Profiles set back along their normals, by ring space.
+    /// Set-back of the profiles along their normals, by ring space.
     pub ring_space_um: Vec<f64>,
-    /// Spaces turned away, by ring space.
+    /// Rotation of the ring spaces away from the flank under load, by ring space.
     pub ring_space_angle_arcsec: Vec<f64>,
-    /// The wave generator set back, by lobe.
+    /// Set-back of the wave generator, by lobe.
     pub wave_generator_lobe_um: Vec<f64>,
-    /// How far and in which direction, seen in itself, each part stands off the axis.
+    /// Offset of each part from the axis.
     pub runout: PerContact<Runout>,
 }
 
-/// A part off its axis.
+/// Offset of a part from the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Runout {
-    /// How far.
+    /// Distance from the axis.
     pub amount_um: f64,
-    /// In which direction, fixed in the part: from the major axis of lobe 0, the middle of ring space 0, or slot 0.
+    /// Direction, fixed in the part: from the major axis of lobe 0, the middle of ring space 0, or slot 0.
     pub angle_deg: f64,
 }
 
 impl Deviations {
-    /// The lists, each with what it is of.
+    /// Returns the lists, each with its kind.
     fn lists(&self) -> [(Listed, &[f64]); 6] {
         [
             (Listed::ToothRadius, &self.tooth_radius_um),
@@ -88,7 +88,8 @@ impl Deviations {
         ]
     }
 
-    /// What of them cannot be: beside a drive of these parameters, as far as the numbers of its items can be.
+    /// Returns the values that are impossible for a drive of these parameters. Lists are checked against item counts
+    /// that are valid.
     pub fn violations(&self, drive: &DriveParameters) -> Vec<Violation> {
         let mut violations = Vec::new();
         for (listed, list) in self.lists() {
@@ -116,7 +117,7 @@ impl Deviations {
         violations
     }
 
-    /// Whether there are none: then zones are alike, and places do not matter.
+    /// True if all deviations are zero. Zones are then alike, and places do not matter.
     pub fn is_nil(&self) -> bool {
         !(self.are_of_slots() || self.are_of_ring_spaces() || self.are_of_lobes())
     }
@@ -133,18 +134,18 @@ impl Deviations {
         any([&self.wave_generator_lobe_um]) || self.runout.wave_generator.is_any()
     }
 
-    /// The mesh of a drive with these deviations, over a sweep of as many load periods as it takes until the items that deviate meet again as
-    /// they did (docs/explanation/theory.md section 4.8).
+    /// Returns the mesh of a drive with these deviations. Its sweep has as many load periods as it takes until the same
+    /// items meet again (docs/explanation/theory.md section 4.8).
     pub fn mesh(&self, drive: &Drive) -> Mesh {
         if self.is_nil() {
             return Mesh::new(drive);
         }
         let p = drive.parameters();
-        // Counts of a checked drive are positive and small.
+        // The counts of a checked drive are positive and small.
         let whole = |count: i64| count.unsigned_abs();
         let (lobes, teeth, slots, spaces) =
             (u64::from(drive.lobes()), whole(p.teeth), whole(p.installed), whole(p.ring_teeth));
-        // The shift after which they meet again, in load periods: `items` over `alike`.
+        // Shift after which they meet again, in load periods: `items` over `alike`.
         let (items, alike) = match (self.are_of_slots(), self.are_of_ring_spaces(), self.are_of_lobes()) {
             (false, false, _) => (1, 1),
             (true, false, false) => (slots, lobes),
@@ -158,7 +159,7 @@ impl Deviations {
     }
 }
 
-/// Whether any entry of some lists is not zero.
+/// True if any entry of the lists is not zero.
 fn any<const LISTS: usize>(lists: [&[f64]; LISTS]) -> bool {
     lists.into_iter().flatten().any(|&value| value != 0.0)
 }
@@ -169,12 +170,12 @@ impl Runout {
     }
 }
 
-/// The entry of a list; zero beyond it.
+/// Returns an entry of a list; zero beyond its end.
 pub(crate) fn of(list: &[f64], index: u64) -> f64 {
     usize::try_from(index).ok().and_then(|index| list.get(index)).copied().unwrap_or_default()
 }
 
-/// The entry in the middle of a list by size; zero of none.
+/// Returns the middle entry of a list, ordered by value; zero if it is empty.
 fn middle(list: &[f64]) -> f64 {
     let mut by_size = list.to_vec();
     by_size.sort_by(f64::total_cmp);
@@ -182,7 +183,7 @@ fn middle(list: &[f64]) -> f64 {
 }
 
 impl Modification {
-    /// As conjugate parts are.
+    /// Conjugate parts without modification.
     pub const NONE: Self = Self {
         ring_equidistant_um: 0.0,
         ring_path_shift_um: 0.0,
@@ -195,7 +196,7 @@ impl Modification {
         ring_tip_relief: None,
     };
 
-    /// Its numbers.
+    /// Returns the values with their kinds.
     pub(crate) fn parameters(&self) -> Vec<(Modified, f64)> {
         let mut parameters = vec![
             (Modified::RingEquidistant, self.ring_equidistant_um),
@@ -217,7 +218,7 @@ impl Modification {
         parameters
     }
 
-    /// The largest of the numbers that shape the ring, each in its unit.
+    /// Returns the largest of the values that shape the ring, each in its unit.
     pub(crate) fn greatest_of_ring(&self) -> (Modified, f64) {
         let shapes_ring = |modified: &Modified| {
             matches!(
@@ -235,7 +236,8 @@ impl Modification {
             .unwrap_or((Modified::RingEquidistant, self.ring_equidistant_um))
     }
 
-    /// That its tip relief starts where a drive has no flank; one that starts where no position is has another fault.
+    /// Returns a violation if the tip relief starts beyond the drive's flank. An impossible start position is reported
+    /// elsewhere.
     pub fn violation_in(&self, drive: &Drive) -> Option<Violation> {
         let start_deg = self.ring_tip_relief?.start_deg;
         if Parameter::Modification(Modified::TipReliefStart).check(start_deg).is_some() {
@@ -246,14 +248,14 @@ impl Modification {
             .then_some(Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg })
     }
 
-    /// Whether none of its numbers opens or closes a gap.
+    /// True if none of the values opens or closes a gap.
     pub fn is_nil(&self) -> bool {
         self.first().is_none()
     }
 
-    /// The first of its numbers that opens or closes a gap.
+    /// Returns the first value that opens or closes a gap.
     pub(crate) fn first(&self) -> Option<Parameter> {
-        // Asked at every tooth.
+        // Fast path: called for every tooth.
         if *self == Self::NONE {
             return None;
         }
@@ -264,7 +266,7 @@ impl Modification {
     }
 }
 
-/// The gaps of a drive.
+/// Gaps of a drive.
 #[derive(Debug, Clone, Copy)]
 pub struct Gaps<'a> {
     drive: &'a Drive,
@@ -274,8 +276,8 @@ pub struct Gaps<'a> {
     usual: Usual,
 }
 
-/// What moves teeth along the flank at most places: with a gap at its slot a tooth lies aside, as if its wall were turned away. Of items, those in the middle of
-/// their lists by size: nothing where most have nothing, and all of it where they are alike.
+/// Common displacement of teeth along the flank. A gap at its slot has the effect of a rotated wall. For items it is
+/// the median of their lists: zero if most are zero, the common value if all are equal.
 #[derive(Debug, Clone, Copy, Default)]
 struct Usual {
     turned: Turned,
@@ -297,7 +299,8 @@ impl Usual {
     }
 }
 
-/// How far flanks and walls are turned away about the axis: lost motion alone (docs/explanation/theory.md section 4.8).
+/// Rotation of flanks and walls about the axis away from the flank under load: lost motion only
+/// (docs/explanation/theory.md section 4.8).
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Turned {
     ring_rad: f64,
@@ -305,24 +308,25 @@ pub(crate) struct Turned {
 }
 
 impl Turned {
-    /// `kτ` of a ring, `(Z_G/U) τ` of a carrier.
+    /// Returns the lost motion: `kτ` for a ring, `(Z_G/U) τ` for a carrier.
     pub(crate) fn lost_motion_rad(&self, drive: &Drive) -> f64 {
         drive.flank().teeth_per_wave() * self.ring_rad + drive.teeth_per_wave() * self.carrier_rad
     }
 
-    /// Of flank and wall together.
+    /// Returns the sum of flank and wall rotation.
     pub(crate) const fn rad(&self) -> f64 {
         self.ring_rad + self.carrier_rad
     }
 
-    /// With a gap at the slot of a tooth, whose centre is so far out.
+    /// Adds a gap at the slot of a tooth with this centre radius.
     pub(crate) fn and_aside(self, gap_mm: f64, center_radius_mm: f64) -> Self {
         Self { carrier_rad: self.carrier_rad + gap_mm / center_radius_mm, ..self }
     }
 }
 
 impl<'a> Gaps<'a> {
-    /// From clearances, which are the same at every tooth, modifications, which depend on its position, and deviations, which depend on its place.
+    /// Creates the gaps. Clearances are equal at every tooth, modifications depend on its position, and deviations on
+    /// its place.
     pub fn new(
         drive: &'a Drive,
         clearance_um: &PerContact<f64>,
@@ -335,19 +339,19 @@ impl<'a> Gaps<'a> {
         Self { drive, clearance_mm, modification, deviations, usual }
     }
 
-    /// Whether there is no gap anywhere.
+    /// True if there is no gap anywhere.
     pub fn is_nil(&self) -> bool {
         self.deviations.is_none()
             && self.modification.first().is_none()
             && self.clearance_mm.iter().all(|(_, &gap_mm)| gap_mm == 0.0)
     }
 
-    /// Whether they are the same for every tooth and position.
+    /// True if the gaps are the same for every tooth and position.
     pub(crate) fn are_uniform(&self) -> bool {
         self.deviations.is_none() && self.modification.first().is_none()
     }
 
-    /// The clearance of each contact.
+    /// Returns the clearance of each contact.
     pub(crate) const fn clearance_mm(&self) -> &PerContact<f64> {
         &self.clearance_mm
     }
@@ -360,7 +364,7 @@ impl<'a> Gaps<'a> {
         self.deviations
     }
 
-    /// The gap at each contact of a tooth, along its normal; negative where a part is too full.
+    /// Returns the gap at each contact of a tooth, along its normal; negative for interference.
     pub fn at(&self, place: &Place, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
         let d = center.center_radius_mm;
         let sin = flank.tan_pressure_angle * flank.cos_pressure_angle;
@@ -371,8 +375,8 @@ impl<'a> Gaps<'a> {
         gap_mm
     }
 
-    /// How far the wave generator turns to make up for what is turned alike at all teeth: without a rounding that would tell them apart, and
-    /// decide under a light load which of them carry.
+    /// Returns the wave generator's rotation for the lost motion common to all teeth. It is kept separate: rounding
+    /// would make teeth differ and decide which ones carry a light load.
     pub(crate) fn lost_motion_rad(&self) -> f64 {
         self.turned_alike().lost_motion_rad(self.drive)
     }
@@ -385,7 +389,7 @@ impl<'a> Gaps<'a> {
         }
     }
 
-    /// What is turned at one place besides.
+    /// Returns the additional rotation at one place.
     pub(crate) fn turned_at(&self, place: &Place) -> Turned {
         self.deviations.map_or_else(Turned::default, |deviations| Turned {
             ring_rad: RAD_PER_ARCSEC * of(&deviations.ring_space_angle_arcsec, place.ring_space),
@@ -393,12 +397,13 @@ impl<'a> Gaps<'a> {
         })
     }
 
-    /// What is turned at most places besides what is alike, gaps at slots counted as well, for a tooth whose centre is so far out: positions on the flank count from there.
+    /// Returns the additional rotation at most places, gaps at slots included, for a tooth with this centre radius.
+    /// Positions on the flank are relative to it.
     pub(crate) fn usually_turned(&self, center_radius_mm: f64) -> Turned {
         self.usual.turned.and_aside(self.usual.carrier_mm, center_radius_mm)
     }
 
-    /// The gaps but for those that flanks and walls leave which are turned away about the axis.
+    /// Returns the gaps except those from flanks and walls rotated about the axis.
     pub(crate) fn besides_turns(&self, place: &Place, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
         let mut gap_mm = self.clearance_mm;
         self.add_modification(center, flank, &mut gap_mm);
@@ -412,7 +417,7 @@ impl<'a> Gaps<'a> {
         let m = &self.modification;
         let d = center.center_radius_mm;
         let (cos, sin) = (flank.cos_pressure_angle, flank.tan_pressure_angle * flank.cos_pressure_angle);
-        // The angle δ of the contact on the ring against the tooth's centre line, as seen from the axis.
+        // Angle δ between the contact on the ring and the tooth's centre line, seen from the axis.
         let to_ring_mm = flank.distance_mm;
         let (along, across) = (d + to_ring_mm * cos, to_ring_mm * sin);
         let cos_to_profile = (along * cos + across * sin) / along.hypot(across);
@@ -432,7 +437,7 @@ impl<'a> Gaps<'a> {
         let start_rad = start_deg.to_radians();
         let end_rad = self.drive.flank_limit().position.from_lobe_rad;
         let beyond_rad = center.position.from_lobe_rad - start_rad;
-        // A corner is as far back as the flank's end.
+        // A corner is set back as far as the flank's end.
         if beyond_rad > 0.0 { amount_um * (beyond_rad / (end_rad - start_rad)).min(1.0).powf(power) } else { 0.0 }
     }
 
@@ -447,7 +452,8 @@ impl<'a> Gaps<'a> {
         let p = self.drive.parameters();
         let s = self.drive.sense();
         let thinner_mm = MM_PER_UM * of(&deviations.tooth_radius_um, slot);
-        // Directions, each in its own part: of the cam's normal, of the ring's outward normal, and in which a slot's wall is pressed.
+        // Directions, each in the frame of its own part: the cam's normal, the ring's outward normal, and the force on
+        // a slot's wall.
         let normal_rad = center.normal_rad();
         let cam_rad = normal_rad + 2.0 * PI * lobe as f64 / f64::from(self.drive.lobes());
         let beta_rad = flank.tan_pressure_angle.atan();

@@ -1,9 +1,9 @@
-//! The parts as they are made: what the mechanics leave free, and clearances (docs/explanation/theory.md section 8).
+//! Dimensions of the manufactured parts: free dimensions and clearances (docs/explanation/theory.md section 8).
 //!
 //! A part's clearance sets its working surface back into the part, along the surface's normal: the ring's flank outward, the cam
 //! inward, the slot's walls apart, the tooth's radius down. The gap at a contact is the sum of its two parts' clearances.
-//! A modification shapes the same surfaces, and may set them forward too. Whatever the gaps, the teeth's centres are drawn where they
-//! stand without any.
+//! A modification shapes the same surfaces, and may also set them forward. The teeth's centres are always drawn at
+//! their positions without gaps.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use crate::gaps::{MM_PER_UM, Modification};
 use crate::tooth_space::ToothSpace;
 use crate::violation::{Misfit, Modified, Parameter, Violation};
 
-/// What the mechanics leave free. A radius that is `None` takes its default.
+/// Dimensions that the mechanics do not determine. A radius that is `None` takes its default.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PartsParameters {
     /// Outer radius of the ring; by default [`RIM`] times the largest radius of its tooth spaces.
@@ -24,29 +24,29 @@ pub struct PartsParameters {
     pub carrier_outer_radius_mm: Option<f64>,
     /// Radius of the wave generator's bore; it has none by default.
     pub bore_radius_mm: Option<f64>,
-    /// How far the cam is set back along its normal.
+    /// Set-back of the cam along its normal.
     pub wave_generator_clearance_um: f64,
-    /// How far a tooth's surface is set back: how much smaller than `r` its radius is.
+    /// Set-back of a tooth's surface: `r` minus the manufactured radius.
     pub teeth_clearance_um: f64,
-    /// How far the ring's flank is set back along its normal.
+    /// Set-back of the ring's flank along its normal.
     pub ring_clearance_um: f64,
-    /// How far each wall of a slot is set back.
+    /// Set-back of each wall of a slot.
     pub carrier_clearance_um: f64,
-    /// How parts are made otherwise than conjugate.
+    /// Intended differences from conjugate parts.
     pub modification: Modification,
 }
 
-/// The radii between which the carrier has its slots, as far as they are given.
+/// Radii between which the carrier has its slots, if given.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CarrierRadii {
     /// Radius of the carrier's bore; by default [`CARRIER_PLAY`] outside the cam.
     pub inner_mm: Option<f64>,
-    /// Its outer radius; by default [`CARRIER_PLAY`] inside the ring's tips.
+    /// Outer radius of the carrier; by default [`CARRIER_PLAY`] inside the ring's tips.
     pub outer_mm: Option<f64>,
 }
 
 impl CarrierRadii {
-    /// Both, those that are not given by default.
+    /// Returns both radii, with defaults for those not given.
     pub(crate) fn of(self, drive: &Drive) -> [f64; 2] {
         let annulus = Annulus::of(drive);
         [
@@ -55,12 +55,13 @@ impl CarrierRadii {
         ]
     }
 
-    /// Why no carrier has these radii beside a cam that is set forward so far, as far as the drive is possible; nothing where none is given.
+    /// Returns violations if no carrier with these radii fits a cam that is set forward by this amount. It checks as
+    /// far as the drive is possible, and nothing if no radius is given.
     pub(crate) fn violations(self, draft: &Draft, set_forward_um: f64) -> Vec<Violation> {
         self.violations_between(draft.cam_outer_mm, Annulus::of_draft(draft), set_forward_um)
     }
 
-    /// The same of a drive that is possible.
+    /// Returns the same violations for a possible drive.
     pub(crate) fn violations_in(self, drive: &Drive, set_forward_um: f64) -> Vec<Violation> {
         self.violations_between(Some(drive.cam_outer_radius_mm()), Some(Annulus::of(drive)), set_forward_um)
     }
@@ -79,19 +80,20 @@ impl CarrierRadii {
     }
 }
 
-/// Outer over root radius of a ring that none is given for: a rim as thick as a fifth of the radius is rigid beside what it holds.
+/// Default outer radius of a ring divided by its root radius. A rim thickness of a fifth of the radius is rigid
+/// compared with the contacts.
 pub const RIM: f64 = 1.2;
 
-/// Share of the annulus between cam and ring tips that is left free on either side of a carrier that no radius is given for.
+/// Share of the annulus between cam and ring tips that is left free on each side of a carrier with default radii.
 pub const CARRIER_PLAY: f64 = 0.1;
 
-/// A ring's rim or a cam's wall thinner than this share of its radius is none: by the default chord tolerance a solid's splines are
-/// within a hundredth of a micrometre of their curves, and one that they pass is invalid to CAD kernels.
+/// Smallest wall thickness of a rim or cam, as a share of its radius. With the default chord tolerance, splines are
+/// within 0.01 µm of their curves. A solid whose walls they cross is invalid in CAD kernels.
 pub const LEAST_WALL: f64 = 1e-6;
 
 impl PartsParameters {
-    /// Every reason why a part cannot be made: values out of their ranges, and whatever does not fit among those of part and drive
-    /// that are possible.
+    /// Returns every reason why a part cannot be made: values outside their ranges, and conflicts among the valid
+    /// values of part and drive.
     pub fn violations(&self, part: Part, draft: &Draft) -> Vec<Violation> {
         let mut checks = Checks(Vec::new());
         let of_part = self.modification.parameters().into_iter().filter(|(modified, _)| modified.part() == part);
@@ -107,7 +109,7 @@ impl PartsParameters {
         checks.0
     }
 
-    /// The carrier's radii.
+    /// Returns the carrier's radii.
     const fn carrier_radii(&self) -> CarrierRadii {
         CarrierRadii { inner_mm: self.carrier_inner_radius_mm, outer_mm: self.carrier_outer_radius_mm }
     }
@@ -139,14 +141,15 @@ impl PartsParameters {
                     (Modified::WaveGeneratorEquidistant, self.modification.wave_generator_equidistant_um);
                 let left_um = greatest_um - self.wave_generator_clearance_um;
                 checks.modification(value < left_um, modified, value, left_um);
-                // Set forward it stays inside the path of the teeth's centres, up to which its parallel curves are regular.
+                // A cam set forward stays inside the path of the teeth's centres, up to which its parallel curves are
+                // regular.
                 if let Some(r) = draft.tooth_radius_mm {
                     let least_um = -r / MM_PER_UM - self.wave_generator_clearance_um;
                     checks.modification(value > least_um, modified, value, least_um);
                 }
             }
         }
-        // Where nothing of the cam is left, no bore is small enough.
+        // If nothing of the cam is left, no bore is small enough.
         let set_back_mm = clearance_mm + MM_PER_UM * self.modification.wave_generator_equidistant_um;
         let cam_mm = draft.cam_inner_mm.map(|inner_mm| inner_mm - set_back_mm).filter(|&cam_mm| cam_mm > 0.0);
         if let (Some(bore_mm), Some(cam_mm)) = (bore_mm, cam_mm) {
@@ -174,7 +177,7 @@ impl PartsParameters {
         }
     }
 
-    /// The ring's tooth space as it is made, where its numbers are in their ranges and leave one.
+    /// Returns the manufactured tooth space of the ring, if its values are valid and leave one.
     fn ring_space(&self, draft: &Draft) -> Option<ToothSpace> {
         let of_ring = self.modification.parameters().into_iter().filter(|(modified, _)| modified.part() == Part::Ring);
         let given = of_ring.map(|(modified, value)| (Parameter::Modification(modified), value));
@@ -187,7 +190,7 @@ impl PartsParameters {
 
     fn check_teeth(&self, draft: &Draft, checks: &mut Checks) {
         let clearance_mm = checks.clearance_mm(Part::Teeth, self.teeth_clearance_um);
-        // Between flats a tooth is thinnest.
+        // A tooth is thinnest between its flats.
         if let (Some(_), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
             let half_width_um = half_width_mm / MM_PER_UM;
             checks.below(Misfit::ClearanceTakesTooth, self.teeth_clearance_um, half_width_um);
@@ -197,7 +200,7 @@ impl PartsParameters {
     }
 }
 
-/// What is left for the carrier between cam and ring tips.
+/// Annulus for the carrier between cam and ring tips.
 #[derive(Debug, Clone, Copy)]
 struct Annulus {
     inner_mm: f64,
@@ -205,18 +208,18 @@ struct Annulus {
 }
 
 impl Annulus {
-    /// Of a drive, which has one.
+    /// Returns the annulus of a drive, which always has one.
     fn of(drive: &Drive) -> Self {
         Self { inner_mm: drive.cam_outer_radius_mm(), outer_mm: drive.tip_radius_mm() }
     }
 
-    /// The same, as far as the drive is possible.
+    /// Returns the annulus as far as the drive is possible.
     fn of_draft(draft: &Draft) -> Option<Self> {
         let ring = draft.ring?;
         Self::between(ring.flank.locus().cam_outer_radius_mm(), ring.tip_radius_mm)
     }
 
-    /// The annulus, where there is one.
+    /// Returns the annulus, if there is one.
     fn between(inner_mm: f64, outer_mm: f64) -> Option<Self> {
         let annulus = Self { inner_mm, outer_mm };
         (annulus.inner_mm < annulus.outer_mm).then_some(annulus)
@@ -235,21 +238,21 @@ impl Annulus {
     }
 }
 
-/// The ring as it is made.
+/// Manufactured ring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RingPart {
     pub(crate) space: ToothSpace,
     pub(crate) outer_radius_mm: f64,
 }
 
-/// The wave generator as it is made.
+/// Manufactured wave generator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WaveGeneratorPart {
     pub(crate) set_back_mm: f64,
     pub(crate) bore_radius_mm: Option<f64>,
 }
 
-/// The carrier as it is made.
+/// Manufactured carrier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CarrierPart {
     pub(crate) inner_radius_mm: f64,
@@ -257,11 +260,11 @@ pub struct CarrierPart {
     pub(crate) slot_half_width_mm: f64,
 }
 
-/// A tooth as it is made.
+/// Manufactured tooth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToothPart {
     pub(crate) radius_mm: f64,
-    /// Half its width across the slot, less than the radius between flats.
+    /// Half the width across the slot, less than the radius between flats.
     pub(crate) half_width_mm: f64,
 }
 
@@ -296,7 +299,7 @@ impl CarrierPart {
 }
 
 impl CarrierPart {
-    /// The carrier without clearance or play, where the mechanics leave room for one.
+    /// Returns the carrier without clearance or play, if there is space for one.
     pub(crate) fn widest(drive: &Drive) -> Option<Self> {
         let Annulus { inner_mm, outer_mm } = Annulus::between(drive.cam_outer_radius_mm(), drive.tip_radius_mm())?;
         let slot_half_width_mm = drive.slot_half_width_mm();
@@ -316,11 +319,11 @@ impl ToothPart {
     }
 }
 
-/// What is wrong, as it is found.
+/// Violations found so far.
 struct Checks(Vec<Violation>);
 
 impl Checks {
-    /// The value, where it is in its range.
+    /// Returns the value if it is in its range.
     fn in_range(&mut self, parameter: Parameter, value: f64) -> Option<f64> {
         let violation = parameter.check(value);
         self.0.extend(violation);
@@ -338,7 +341,8 @@ impl Checks {
         }
     }
 
-    /// That the carrier's radii leave a wall between cam and ring tips, both of which may be set forward; the outer one, where it is possible.
+    /// Checks that the carrier's radii leave a wall between cam and ring tips, both of which may be set forward.
+    /// Returns the outer radius if it is possible.
     fn carrier_radii(
         &mut self,
         radii: CarrierRadii,
@@ -365,7 +369,7 @@ impl Checks {
         outer_mm
     }
 
-    /// That a modification leaves something of its part.
+    /// Checks that a modification leaves some of its part.
     fn modification(&mut self, holds: bool, modified: Modified, value: f64, limit: f64) {
         if !holds {
             self.0.push(Violation::ModificationLeavesNothing { modified, value, limit: Some(limit) });
