@@ -1,4 +1,4 @@
-//! Findings as they go over the wire, with what each means and what to change.
+//! Findings in JSON, with their meaning and advice.
 
 use std::io::{self, Write};
 
@@ -13,24 +13,24 @@ use crate::design::{DeprecatedField, Design, SetBackTwice};
 use crate::field::{contact_name, pointer};
 use crate::no_answer::NoAnswer;
 
-/// What a designer should be told about a drive that can exist; docs/reference/findings.md has the formula behind each code.
+/// Finding about a drive that can exist. docs/reference/findings.md has the formula behind each code.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FindingAnswer {
-    /// The kind of finding, a stable word.
+    /// Kind of finding, a stable word.
     pub code: FindingCode,
-    /// How grave it is.
+    /// Severity of the finding.
     pub severity: Severity,
-    /// JSON pointers to the fields that it is about.
+    /// JSON pointers to the fields that the finding is about.
     pub pointers: Vec<String>,
-    /// What was found.
+    /// Value that caused the finding.
     pub value: f64,
-    /// What it is measured against.
+    /// Limit of the value.
     pub limit: f64,
     /// Unit of value and limit; empty for a count.
     pub unit: String,
-    /// What it means.
+    /// Meaning of the finding.
     pub detail: String,
-    /// What to change.
+    /// Recommended change.
     pub advice: String,
 }
 
@@ -40,7 +40,7 @@ const TIP_RADIUS: &str = "/drive/ring/tip_radius_mm";
 const WIDTH: &str = "/drive/teeth/width_mm";
 const LOAD: &str = "/load";
 
-/// What a text tells beside the numbers of a finding, and which fields it points at.
+/// Text of a finding without its numbers, and the fields that it points at.
 struct Text {
     pointers: Vec<String>,
     unit: &'static str,
@@ -53,21 +53,21 @@ fn text(pointers: &[&str], unit: &'static str, detail: impl Into<String>, advice
     Text { pointers, unit, detail: detail.into(), advice: advice.into() }
 }
 
-/// What of a document decides between two texts of a finding.
+/// Properties of a document that select the text of a finding.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Causes {
-    /// Whether a clearance sets the ring back.
+    /// True if a clearance sets the ring back.
     pub(crate) ring_clearance: bool,
-    /// Whether its equidistant modification does.
+    /// True if the equidistant modification sets the ring back.
     pub(crate) ring_equidistant: bool,
-    /// Whether the wave generator moves on under its teeth.
+    /// True if the wave generator moves under its teeth.
     pub(crate) wave_generator_moves: bool,
     /// Fields of the document that open or close gaps.
     pub(crate) gap_fields: &'static [&'static str],
 }
 
 impl FindingAnswer {
-    /// A finding about this drive, which names fields that its document has.
+    /// Creates a finding about this drive. It names only fields that the document has.
     pub(crate) fn new(finding: &Finding, drive: &Drive, causes: Causes) -> Self {
         let Text { pointers, unit, detail, advice } = Text::of(finding, drive, causes);
         let Finding { code, severity, value, limit, .. } = *finding;
@@ -360,21 +360,21 @@ impl Text {
                 format!("the contact stress at the {at} exceeds the fatigue limit of bearing steel (ISO 281:2007)"),
                 format!("lower the torque, {widen}, or let more of them mesh"),
             ),
-            // Of a document, below.
+            // Findings of a document; see below.
             Code::DeprecatedField | Code::SetBackTwice => text(&[], "", "", ""),
         }
     }
 }
 
 impl FindingAnswer {
-    /// What a document itself gives rise to, for an answer to which the model matters or not.
+    /// Returns the findings about the document itself. Set `is_of_model` if the answer depends on the model.
     pub(crate) fn of_document(design: &Design, is_of_model: bool) -> Vec<Self> {
         let deprecated = design.deprecated_fields().into_iter();
         let deprecated = deprecated.filter(|&field| is_of_model || field == DeprecatedField::Clearance);
         deprecated.map(Self::of_deprecated).chain(design.set_back_twice().map(Self::of_set_back_twice)).collect()
     }
 
-    /// That two fields set a surface back.
+    /// Creates the finding that two fields set the same surface back.
     fn of_set_back_twice(SetBackTwice { part, modified, clearance_um, modification_um }: SetBackTwice) -> Self {
         let pointers = [Parameter::PartClearance(part), Parameter::Modification(modified)].map(pointer);
         Self {
@@ -389,7 +389,7 @@ impl FindingAnswer {
         }
     }
 
-    /// That a document uses a field which a later version will not know.
+    /// Creates the finding that a document uses a deprecated field.
     fn of_deprecated(field: DeprecatedField) -> Self {
         Self {
             code: FindingCode::DeprecatedField,
@@ -404,13 +404,13 @@ impl FindingAnswer {
     }
 }
 
-/// The findings about a drive, as they go over the wire.
+/// Returns the findings about a drive, ready for JSON.
 pub(crate) fn drive_findings(drive: &Drive) -> Result<Vec<FindingAnswer>, NoAnswer> {
     let findings = findings::of_drive(drive).map_err(SolveError::from)?;
     Ok(findings.iter().map(|finding| FindingAnswer::new(finding, drive, Causes::default())).collect())
 }
 
-/// The findings, a paragraph each.
+/// Writes one paragraph per finding.
 pub(crate) fn write_findings(findings: &[FindingAnswer], writer: &mut dyn Write) -> io::Result<()> {
     for finding in findings {
         let FindingAnswer { severity, detail, value, limit, unit, advice, .. } = finding;

@@ -1,4 +1,4 @@
-//! A drawing as it goes over the wire, which all its other forms are written from.
+//! A drawing in JSON. All other formats are written from it.
 
 use serde::{Deserialize, Serialize};
 use toothwave_solver::drawing::{Body, Edge, Outline, Placement, Subject};
@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use crate::findings::FindingAnswer;
 
-/// What can be drawn.
+/// Subject of a drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DrawnPart {
@@ -24,7 +24,7 @@ pub enum DrawnPart {
 }
 
 impl DrawnPart {
-    /// All of them.
+    /// All subjects.
     pub const ALL: [Self; 5] = [Self::Ring, Self::WaveGenerator, Self::Carrier, Self::Tooth, Self::Assembly];
 
     pub(super) const fn subject(self) -> Subject {
@@ -38,53 +38,54 @@ impl DrawnPart {
     }
 }
 
-/// A drawing: prisms of the teeth's width, or balls, each given by its section and by where it stands.
+/// Drawing: prisms of the teeth's width, or balls, each given by its section and its placements.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct DrawingAnswer {
     /// Version of the solver.
     pub solver_version: &'static str,
-    /// The build that computed it: equal builds on equal processors give equal bytes.
+    /// Build that computed the drawing. Equal builds on equal processors give equal bytes.
     pub build: &'static str,
-    /// Hash of the solver's version and of the drive, the parts and the chord tolerance: alike on all drawings that belong together.
+    /// Hash of the solver's version, the drive, the parts and the chord tolerance. It is equal for all drawings that
+    /// belong together.
     pub design_hash: String,
-    /// What is drawn.
+    /// Subject of the drawing.
     pub subject: DrawnPart,
-    /// How far a chord of a curve may be from it.
+    /// Largest distance of a chord from its curve.
     pub chord_tolerance_mm: f64,
-    /// Angle of the wave generator; an assembly's.
+    /// Angle of the wave generator, for an assembly only.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub input_angle_deg: Option<f64>,
-    /// The parts that are drawn.
+    /// Drawn parts.
     pub bodies: Vec<BodyAnswer>,
-    /// What a designer should be told about the drive, and about the drawn parts as they are made.
+    /// Findings about the drive and about the drawn parts as manufactured.
     pub findings: Vec<FindingAnswer>,
 }
 
-/// A part: one prism, or, of teeth and of the fingers between the carrier's slots, several alike.
+/// Part as prisms of one section. Teeth and the fingers between the carrier's slots have several placements.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct BodyAnswer {
-    /// Which part.
+    /// Name of the part.
     pub part: BodyPart,
-    /// What stands on its section.
+    /// Shape of the solid on its section.
     pub solid: BodySolid,
-    /// Height of the prism; of a ball, that of the parts which it stands in the middle of.
+    /// Height of the prism. For a ball, that of the parts around it, with the ball in the middle.
     pub width_mm: f64,
-    /// What bounds its section.
+    /// Outer boundary of the section.
     pub outer: OutlineAnswer,
-    /// What is cut out of its section.
+    /// Holes in the section.
     pub holes: Vec<OutlineAnswer>,
-    /// Where each prism stands.
+    /// Placement of each prism.
     pub placements: Vec<PlacementAnswer>,
 }
 
-/// What stands on a section.
+/// Shape of the solid on a section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BodySolid {
-    /// A prism, from the plane of the section up.
+    /// A prism, from the plane of the section upward.
     Prism,
-    /// A ball of the section's radius, its centre half the width above.
+    /// A ball of the section's radius. Its centre is half the width above the section.
     Ball,
 }
 
@@ -98,7 +99,7 @@ pub enum BodyPart {
     Teeth,
     /// The rigid internal wheel.
     Ring,
-    /// The slotted annulus; its fingers, without what joins them beside the teeth.
+    /// The slotted annulus: its fingers, without the discs that join them.
     Carrier,
 }
 
@@ -113,7 +114,8 @@ impl From<Part> for BodyPart {
     }
 }
 
-/// A closed path. Each edge starts at the very point where the one before ends, the first where the last ends; counter-clockwise.
+/// Closed path. Each edge starts exactly at the end point of the edge before, the first at that of the last. Edges are
+/// counter-clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum OutlineAnswer {
@@ -122,22 +124,22 @@ pub enum OutlineAnswer {
         /// Its radius.
         radius_mm: f64,
     },
-    /// Edges one after the other.
+    /// Consecutive edges.
     Path {
         /// The edges.
         edges: Vec<EdgeAnswer>,
     },
 }
 
-/// A piece of an outline.
+/// Edge of an outline.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum EdgeAnswer {
     /// A straight line between two points.
     Line {
-        /// x of its ends.
+        /// x of the two ends.
         x_mm: [f64; 2],
-        /// y of its ends.
+        /// y of the two ends.
         y_mm: [f64; 2],
     },
     /// An arc of a circle.
@@ -153,33 +155,33 @@ pub enum EdgeAnswer {
         /// Angle of the arc, counter-clockwise positive.
         sweep_deg: f64,
     },
-    /// A smooth curve through exact points, its chords true to the chord tolerance: interpolate it, or take the chords.
+    /// A smooth curve through exact points, with chords within the chord tolerance. Interpolate it, or use the chords.
     Curve {
-        /// x of its points.
+        /// x of the points.
         x_mm: Vec<f64>,
-        /// y of its points.
+        /// y of the points.
         y_mm: Vec<f64>,
-        /// Its direction at the first point, from the x axis.
+        /// Direction at the first point, from the x axis.
         start_tangent_deg: f64,
-        /// Its direction at the last point.
+        /// Direction at the last point.
         end_tangent_deg: f64,
-        /// Bézier's polygons of the polynomials that solids have in its place.
+        /// Control polygons of the Bézier polynomials that replace the curve in solids.
         #[serde(skip)]
         polynomials: Vec<Vec<[f64; 2]>>,
-        /// x and y of the start, and the bulge, of the arcs that workshops have in its place.
+        /// x and y of the start, and the bulge, of the arcs that replace the curve in DXF.
         #[serde(skip)]
         arcs: Vec<[f64; 3]>,
     },
 }
 
-/// Where a section stands: turned about its origin, then moved.
+/// Placement of a section: rotated about its origin, then moved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ToSchema)]
 pub struct PlacementAnswer {
-    /// x of its origin.
+    /// x of the origin.
     pub x_mm: f64,
-    /// y of its origin.
+    /// y of the origin.
     pub y_mm: f64,
-    /// How far it is turned, counter-clockwise.
+    /// Rotation, counter-clockwise.
     pub rotation_deg: f64,
 }
 
@@ -214,7 +216,7 @@ impl From<Edge> for EdgeAnswer {
 }
 
 impl OutlineAnswer {
-    /// Centre and radius, where it is a circle: around the origin, or as a path of arcs about one centre.
+    /// Returns centre and radius if the outline is a circle: around the origin, or a path of arcs about one centre.
     pub(super) fn circle(&self) -> Option<([f64; 2], f64)> {
         match self {
             Self::Circle { radius_mm } => Some(([0.0; 2], *radius_mm)),
@@ -231,7 +233,7 @@ impl OutlineAnswer {
 }
 
 impl EdgeAnswer {
-    /// Where it ends.
+    /// Returns the end point.
     pub fn end(&self) -> [f64; 2] {
         match self {
             Self::Line { x_mm, y_mm } => [x_mm[1], y_mm[1]],
@@ -240,7 +242,7 @@ impl EdgeAnswer {
         }
     }
 
-    /// Where it starts.
+    /// Returns the start point.
     pub fn start(&self) -> [f64; 2] {
         match self {
             Self::Line { x_mm, y_mm } => [x_mm[0], y_mm[0]],
@@ -251,7 +253,7 @@ impl EdgeAnswer {
 }
 
 impl PlacementAnswer {
-    /// Takes a point of the section to where it stands.
+    /// Moves a point of the section to its place.
     pub fn placing(&self) -> impl Fn([f64; 2]) -> [f64; 2] + use<> {
         let Self { x_mm, y_mm, rotation_deg } = *self;
         let (sin, cos) = rotation_deg.to_radians().sin_cos();
@@ -263,7 +265,7 @@ impl From<Outline> for OutlineAnswer {
     fn from(outline: Outline) -> Self {
         match outline {
             Outline::Circle { center, radius_mm } if center.coords.norm() > 0.0 => {
-                // From its rightmost point through the uppermost one, and back.
+                // From the rightmost point through the uppermost one, and back.
                 let half = |sign: f64| EdgeAnswer::Arc {
                     x_mm: [center.x + sign * radius_mm, center.x, center.x - sign * radius_mm],
                     y_mm: [center.y, center.y + sign * radius_mm, center.y],

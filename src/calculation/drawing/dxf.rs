@@ -1,18 +1,18 @@
-//! Drawings as DXF of AutoCAD 2000: the oldest with light polylines and declared units.
+//! Drawings as DXF of AutoCAD 2000, the oldest version with light polylines and declared units.
 //!
-//! Written here because the one library for it (crate dxf 0.6) leaves its tables without handles, which readers have to mend.
-//! Structure and group codes are those of Autodesk's DXF reference. docs/reference/dxf.md lists what AutoCAD requires beyond what other
-//! readers do, and which programs have opened these files.
+//! Not written with crate dxf 0.6: it writes tables without handles, which readers must repair. Structure and group
+//! codes follow Autodesk's DXF reference. docs/reference/dxf.md lists AutoCAD's additional requirements, and the
+//! programs that have opened these files.
 
 use std::io::{self, Write};
 
 use super::answer::{BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
 use super::svg;
 
-/// The application under whose name every outline carries what it belongs to, as extended data.
+/// Application name under which every outline stores its part, as extended data.
 const APPLICATION: &str = "TOOTHWAVE";
 
-/// Handles of what others refer to; entities have those from [`FIRST_FREE`] on.
+/// Handles of referenced objects. Entities use handles from [`FIRST_FREE`] on.
 const MODEL_SPACE: u32 = 0x10;
 const PAPER_SPACE: u32 = 0x11;
 const ROOT_DICTIONARY: u32 = 0x12;
@@ -21,13 +21,13 @@ const PLOT_STYLE_DICTIONARY: u32 = 0x14;
 const PLOT_STYLE: u32 = 0x15;
 const FIRST_FREE: u32 = 0x20;
 
-/// Line weight of layers: the default one.
+/// Default line weight of layers.
 const DEFAULT_LINE_WEIGHT: i64 = -3;
 
-/// Share of the view's height that is left free around the drawing when it is opened.
+/// Margin around the drawing in the initial view, as a share of the view's height.
 const VIEW_MARGIN: f64 = 0.1;
 
-/// A layer's name and its colour in the AutoCAD index.
+/// Name of a layer and its colour in the AutoCAD index.
 struct Layer(&'static str, u8);
 
 const fn layer_of(part: BodyPart) -> Layer {
@@ -42,7 +42,7 @@ const fn layer_of(part: BodyPart) -> Layer {
 /// Writes a drawing.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let mut dxf = Dxf { writer, next_handle: FIRST_FREE };
     let title = svg::title(drawing);
@@ -68,7 +68,7 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     dxf.text(0, "EOF")
 }
 
-/// The file as it is written: pairs of a group code and a value.
+/// Writer of the file: pairs of a group code and a value.
 struct Dxf<'a> {
     writer: &'a mut dyn Write,
     next_handle: u32,
@@ -83,7 +83,7 @@ impl Dxf<'_> {
         write!(self.writer, "{code:>3}\r\n{value}\r\n")
     }
 
-    /// In the fewest digits that are read back as the same number, never without a point.
+    /// Writes a number with the fewest digits that are read back as the same number, always with a point.
     fn number(&mut self, code: u16, value: f64) -> io::Result<()> {
         write!(self.writer, "{code:>3}\r\n{value:?}\r\n")
     }
@@ -102,7 +102,7 @@ impl Dxf<'_> {
         self.text(2, name)
     }
 
-    /// The start of an object: its type, its handle, its owner.
+    /// Writes the start of an object: its type, its handle, its owner.
     fn object(&mut self, kind: &str, owner: u32) -> io::Result<u32> {
         let handle = self.next_handle;
         self.next_handle += 1;
@@ -112,7 +112,7 @@ impl Dxf<'_> {
 
     fn object_as(&mut self, kind: &str, handle: u32, owner: u32) -> io::Result<()> {
         self.text(0, kind)?;
-        // Dimension styles alone keep their handle elsewhere.
+        // Only dimension styles keep their handle in another group.
         self.handle(if kind == "DIMSTYLE" { 105 } else { 5 }, handle)?;
         self.handle(330, owner)
     }
@@ -129,19 +129,19 @@ impl Dxf<'_> {
             self.point(10, [corner_mm; 2])?;
             self.number(30, 0.0)?;
         }
-        // Metric, and a unit is a millimetre.
+        // Metric; the unit is a millimetre.
         for (name, value) in [("$MEASUREMENT", 1), ("$INSUNITS", 4)] {
             self.text(9, name)?;
             self.integer(70, value)?;
         }
-        // Beyond every handle of the tables and of the outlines.
+        // Above all handles of the tables and of the outlines.
         let beyond = u32::try_from(outlines).unwrap_or(u32::MAX).saturating_add(0x100);
         self.text(9, "$HANDSEED")?;
         self.handle(5, beyond)?;
         self.text(0, "ENDSEC")
     }
 
-    /// The kinds of object that are none of AutoCAD's own and stand in this file.
+    /// Writes the classes of objects in this file that are not built into AutoCAD.
     fn classes(&mut self) -> io::Result<()> {
         self.section("CLASSES")?;
         for (kind, class) in
@@ -240,16 +240,16 @@ impl Dxf<'_> {
         self.integer(70, 0)
     }
 
-    /// What is seen when the file is opened: the whole drawing, from above, without snap and grid.
+    /// Writes the initial view: the whole drawing, from above, without snap and grid.
     fn view(&mut self, table: u32, reach_mm: f64) -> io::Result<()> {
         self.record("VPORT", "AcDbViewportTableRecord", table, "*Active")?;
-        // Its corners on the screen, its centre, snap and grid.
+        // Corners on the screen, centre, snap and grid.
         for (code, point) in
             [(10, [0.0; 2]), (11, [1.0; 2]), (12, [0.0; 2]), (13, [0.0; 2]), (14, [10.0; 2]), (15, [10.0; 2])]
         {
             self.point(code, point)?;
         }
-        // The direction that it is seen from, and the point looked at.
+        // Direction of view and target point.
         for (code, z) in [(16, 1.0), (17, 0.0)] {
             self.point(code, [0.0; 2])?;
             self.number(code + 20, z)?;
@@ -259,7 +259,7 @@ impl Dxf<'_> {
         for (code, value) in [(40, height_mm), (41, 1.0), (42, 50.0), (43, 0.0), (44, 0.0), (50, 0.0), (51, 0.0)] {
             self.number(code, value)?;
         }
-        // Mode, smoothness of circles, fast zoom, coordinate icon, and the rest off.
+        // Mode, smoothness of circles, fast zoom, coordinate icon; the rest is off.
         for (code, value) in [(71, 0), (72, 1000), (73, 1), (74, 3), (75, 0), (76, 0), (77, 0), (78, 0)] {
             self.integer(code, value)?;
         }
@@ -331,7 +331,7 @@ impl Dxf<'_> {
         self.text(100, class)
     }
 
-    /// The named dictionaries: of groups, empty, and of plot styles, which every layer has to have one of.
+    /// Writes the named dictionaries: one of groups, empty, and one of plot styles, which every layer needs.
     fn objects(&mut self) -> io::Result<()> {
         self.section("OBJECTS")?;
         let entries = [("ACAD_GROUP", GROUP_DICTIONARY), ("ACAD_PLOTSTYLENAME", PLOT_STYLE_DICTIONARY)];
@@ -357,7 +357,7 @@ impl Dxf<'_> {
     }
 }
 
-/// Vertices of an edge but its last, at which the next one starts.
+/// Returns the vertices of an edge except its last, which is the start of the next edge.
 const fn vertex_count(edge: &EdgeAnswer) -> usize {
     match edge {
         EdgeAnswer::Line { .. } | EdgeAnswer::Arc { .. } => 1,

@@ -1,29 +1,32 @@
 //! Bodies as closed meshes of triangles, for printers.
 //!
-//! A section lies between two lines that run side by side, counter-clockwise: a bore and an outline, a ring's teeth and its rim, the inner and the outer
-//! arc of a finger, or a point in the middle and an outline. Rungs join them, and between two rungs there are one or two triangles. So the mesh is
-//! closed whatever the numbers are: on every edge of a triangle that no other one has stands a wall.
+//! A section lies between two parallel lines, counter-clockwise: a bore and an outline, a ring's teeth and its rim, the
+//! inner and the outer arc of a finger, or a point in the middle and an outline. Rungs join the lines, with one or two
+//! triangles between two rungs. Every triangle edge without a neighbour has a wall, so the mesh is closed for all
+//! numbers.
 
 use std::f64::consts::PI;
 
 use super::answer::{BodyAnswer, BodyPart, BodySolid, DrawingAnswer, EdgeAnswer, OutlineAnswer};
 
-/// Chords of a circle at most: on a radius of a metre they are 1 nm from it.
+/// Largest number of chords of a circle. On a radius of 1 m they are within 1 nm of it.
 const MOST_CHORDS: u32 = 100_000;
 
-/// The same of a ball, which has half as many triangles as their square.
+/// The same for a ball, which has half as many triangles as the square of this number.
 const MOST_CHORDS_OF_BALL: u32 = 360;
 
-/// Points of a line that are nearer to each other than this share of the farthest one are one: a number in STL has seven digits.
+/// Distance at which points of a line are merged, as a share of the farthest point's distance. A number in STL has
+/// seven digits.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// Triangles by the places of their corners in the list of points, counter-clockwise seen from outside.
+/// Triangles as indices into the list of points, counter-clockwise seen from outside.
 pub(super) struct Mesh {
     pub(super) points_mm: Vec<[f64; 3]>,
     pub(super) triangles: Vec<[usize; 3]>,
 }
 
-/// About how many bytes the meshes of a drawing take: for each point of an outline four, eight triangles, and as many again where another line is beside it.
+/// Returns the approximate bytes of a drawing's meshes: four points and eight triangles per outline point, and as many
+/// again if another line is parallel to it.
 pub(super) fn held_bytes(drawing: &DrawingAnswer) -> u64 {
     const POINT_BYTES: u64 = 320;
     const BALL_BYTES: u64 = 6 << 20;
@@ -46,16 +49,16 @@ pub(super) fn held_bytes(drawing: &DrawingAnswer) -> u64 {
     drawing.bodies.iter().map(of_body).sum()
 }
 
-/// A section, cut into triangles.
+/// Section, divided into triangles.
 #[derive(Default)]
 struct Ladder {
     points: Vec<[f64; 2]>,
-    /// From a point of the inner line to one of the outer line, counter-clockwise.
+    /// Rungs from a point of the inner line to one of the outer line, counter-clockwise.
     rungs: Vec<[usize; 2]>,
 }
 
 impl Mesh {
-    /// Of a body where its section is drawn, true to the chord tolerance.
+    /// Divides the section of a body, at its original position, within the chord tolerance.
     pub(super) fn new(body: &BodyAnswer, tolerance_mm: f64) -> Self {
         match (body.solid, &body.outer) {
             (BodySolid::Ball, OutlineAnswer::Circle { radius_mm }) => {
@@ -65,7 +68,7 @@ impl Mesh {
         }
     }
 
-    /// A prism from z = 0 up.
+    /// Adds a prism from z = 0 upward.
     fn prism(Ladder { points, rungs }: &Ladder, width_mm: f64) -> Self {
         let points_mm = [0.0, width_mm].iter().flat_map(|&z| points.iter().map(move |&[x, y]| [x, y, z])).collect();
         let mut mesh = Self { points_mm, triangles: Vec::new() };
@@ -90,17 +93,18 @@ impl Mesh {
         mesh
     }
 
-    /// A triangle of the section, at the top and at the bottom.
+    /// Adds a triangle of the section, at the top and at the bottom.
     fn cap(&mut self, [a, b, c]: [usize; 3], above: usize) {
         self.triangles.extend([[a + above, b + above, c + above], [a, c, b]]);
     }
 
-    /// A wall on an edge of the section, the material on its left.
+    /// Adds a wall on an edge of the section, with the material on its left.
     fn wall(&mut self, from: usize, to: usize, above: usize) {
         self.triangles.extend([[from, to, to + above], [from, to + above, from + above]]);
     }
 
-    /// A ball around a place on the z axis: between its poles rows of points, as far apart in a row as the rows are.
+    /// Adds a ball around a point on the z axis: rows of points between its poles, with equal distances in and between
+    /// the rows.
     fn ball(radius_mm: f64, center_z_mm: f64, tolerance_mm: f64) -> Self {
         // In the middle of four points the distances along both directions add up.
         let rows = chords(PI, radius_mm, 0.5 * tolerance_mm, MOST_CHORDS_OF_BALL / 2).max(2);
@@ -143,8 +147,8 @@ impl Ladder {
         }
     }
 
-    /// What lies between a line around the origin and a circle about it, inside or outside: on the circle a point stands at the angle of each one of the line,
-    /// and others between where its chords would be too long.
+    /// Fills the area between a line around the origin and a circle about it, inside or outside. The circle has a point
+    /// at the angle of each point of the line, and more where its chords would be too long.
     fn to_circle(line: &[[f64; 2]], radius_mm: f64, tolerance_mm: f64) -> Self {
         let mut ladder = Self::default();
         let is_outside = line.iter().all(|[x, y]| x.hypot(*y) < radius_mm);
@@ -162,7 +166,7 @@ impl Ladder {
         ladder.closed()
     }
 
-    /// What lies within a line that is seen whole from the origin.
+    /// Fills the area within a line that is star-shaped about the origin.
     fn around_origin(line: &[[f64; 2]]) -> Self {
         let mut ladder = Self::default();
         let middle = ladder.point([0.0; 2]);
@@ -173,7 +177,7 @@ impl Ladder {
         ladder.closed()
     }
 
-    /// A finger of the carrier: between its outer arc and its inner one, which runs the other way, or the point that its walls meet in.
+    /// Fills a finger of the carrier: between its outer arc and its inner one, which runs the other way, or its point.
     fn finger(edges: &[EdgeAnswer], tolerance_mm: f64) -> Self {
         let mut arcs = edges.iter().filter_map(|edge| match edge {
             EdgeAnswer::Arc { radius_mm, sweep_deg, .. } => Some((edge.start(), *radius_mm, sweep_deg.to_radians())),
@@ -200,14 +204,14 @@ impl Ladder {
         self.points.len() - 1
     }
 
-    /// The same with its first rung for the last one too.
+    /// Repeats the first rung as the last one.
     fn closed(mut self) -> Self {
         self.rungs.extend(self.rungs.first().copied());
         self
     }
 }
 
-/// The points of a closed outline, each once.
+/// Returns the points of a closed outline, each once.
 fn line(outline: &OutlineAnswer, tolerance_mm: f64) -> Vec<[f64; 2]> {
     let arc = |[x, y]: [f64; 2], [center_x, center_y]: [f64; 2], radius_mm: f64, sweep_rad: f64| {
         let chords = chords(sweep_rad, radius_mm, tolerance_mm, MOST_CHORDS);
@@ -242,13 +246,14 @@ fn line(outline: &OutlineAnswer, tolerance_mm: f64) -> Vec<[f64; 2]> {
     apart
 }
 
-/// A point turned about the origin.
+/// Returns a point rotated about the origin.
 fn turned([x, y]: [f64; 2], by_rad: f64) -> [f64; 2] {
     let (sin, cos) = by_rad.sin_cos();
     [x * cos - y * sin, x * sin + y * cos]
 }
 
-/// How many chords an arc is drawn by: over the angle `4 asin √(t/2R)` one is t away from it, and none is longer than the radius.
+/// Returns the number of chords of an arc. Over the angle `4 asin √(t/2R)` a chord is t away from it, and no chord is
+/// longer than the radius.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from one to the most")]
 fn chords(angle_rad: f64, radius_mm: f64, tolerance_mm: f64, most: u32) -> u32 {
     let of_tolerance_rad = 4.0 * (0.5 * tolerance_mm / radius_mm).min(1.0).sqrt().asin();

@@ -1,11 +1,11 @@
-//! Clearances for a way of making the parts.
+//! Clearances for a manufacturing method.
 
 use serde::Deserialize;
 use utoipa::{IntoParams, ToSchema};
 
 use crate::design::Design;
 
-/// How a part is drawn.
+/// Drawing options of a part.
 #[derive(Debug, Default, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields, default)]
 #[into_params(parameter_in = Query)]
@@ -15,24 +15,24 @@ pub struct DrawingOptions {
     pub preset: Preset,
 }
 
-/// What the clearances of drawn parts are for.
+/// Purpose of the clearances of drawn parts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
-    /// Those of the document.
+    /// Clearances of the document.
     #[default]
     Document,
     /// Printing: 0.1 mm between the two parts of each contact.
     Printing,
 }
 
-/// Half of the clearance at a contact, of which each of its two parts has one.
+/// Clearance of each part for printing: half of the gap at a contact.
 const PRINTED_CLEARANCE_UM: f64 = 50.0;
 
-/// The design with clearances for printing in place of its own.
+/// Returns the design with clearances for printing instead of its own.
 pub(super) fn printed(design: &Design) -> Design {
     let mut printed = design.clone();
-    // Deprecated, and another gap than that of the parts would be a conflict.
+    // Removed: the field is deprecated, and a gap different from that of the parts would be a conflict.
     printed.model.clearance = None;
     let parts = &mut printed.parts;
     parts.wave_generator.clearance_um = PRINTED_CLEARANCE_UM;
