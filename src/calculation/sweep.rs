@@ -55,13 +55,13 @@ pub struct CheckedSweep {
 /// Eleven columns of doubles and two of numbers.
 const STATE_BYTES: u64 = 11 * 8 + 2 * 4;
 
-/// Three columns of doubles and one of numbers, three of radial forces, one of the wind-up without load, and what stands between them while they are made.
+/// Three columns of doubles, one of numbers, three of radial forces, one of the unloaded wind-up, and temporary values.
 const ANGLE_BYTES: u64 = 11 * 8;
 
 /// A number of about 18 characters and its comma.
 const NUMBER_TEXT_BYTES: usize = 20;
 
-/// What a state and an input angle take.
+/// Memory per state and per input angle.
 #[derive(Debug, Clone, Copy)]
 struct Each {
     state_bytes: u64,
@@ -69,18 +69,18 @@ struct Each {
 }
 
 impl CheckedSweep {
-    /// What a state and an input angle take in the answer.
+    /// Returns the memory per state and per input angle in the answer.
     fn each(&self) -> Each {
         // Three columns of slips and one of words.
         const LOSSES_BYTES: u64 = 3 * 8 + 2;
-        // Ratios by contact, bearing and race, powers, and what wears.
+        // Ratios by contact, bearing and race, powers, and wear.
         const LOSSES_ANGLE_BYTES: u64 = 9 * 8;
-        // Three columns of depths, of each point of a duty and of their mean.
+        // Three columns of depths, for each point of a duty and for their mean.
         const WEAR_BYTES: u64 = 3 * 8;
         let Self { duty, losses, .. } = self;
         let has_wear = losses.is_some_and(|losses| losses.wear_rate_mm3_per_nm.is_some());
         let of = |is_asked, bytes| if is_asked { bytes } else { 0 };
-        // With friction every point is swept, one after the other beside the hardest.
+        // With friction every point is swept, one at a time, in addition to the hardest.
         let sweeps = 1 + of(losses.is_some() && duty.points.len() > 1, 1);
         let of_wear = (duty.points.len() as u64 + 1) * of(has_wear, WEAR_BYTES);
         Each {
@@ -89,36 +89,36 @@ impl CheckedSweep {
         }
     }
 
-    /// The drive.
+    /// Returns the drive.
     pub const fn drive(&self) -> &Drive {
         &self.drive
     }
 
-    /// Its load, of a duty the hardest.
+    /// Returns the load; for a duty, that of the hardest point.
     pub fn load(&self) -> &LoadCase {
         self.duty.hardest()
     }
 
-    /// What its single items deviate by.
+    /// Returns the deviations of its single items.
     pub const fn deviations(&self) -> &Deviations {
         &self.deviations
     }
 
-    /// The same, of which wear and the life of a bearing are not asked.
+    /// Returns the same sweep without wear and bearing life.
     pub fn without_wear(self) -> Self {
         let losses = self.losses.map(|losses| LossParameters { wear_rate_mm3_per_nm: None, bearing: None, ..losses });
         Self { losses, ..self }
     }
 
-    /// What a finger of the carrier, as it is held, adds to a tooth's approach at its contacts at the peaks of the load, over that; nothing where
-    /// no estimate tells.
+    /// Returns the share that a finger of the carrier adds to a tooth's approach at its contacts, at the peaks of the
+    /// load. None without an estimate.
     pub fn finger_share(&self, peaks: &PerContact<solver::ContactPeaks>) -> Option<f64> {
         let shares = Shares::of(&self.drive, self.load(), &self.backings, peaks)?.shares;
         let of_finger = shares.into_iter().find(|(estimate, _)| estimate.backing.contact() == Contact::Carrier);
         of_finger.map(|(_, share)| share)
     }
 
-    /// What friction takes over all points of a duty, given the sweep of the hardest; nothing without friction.
+    /// Returns the loss totals over all points of a duty, given the sweep of the hardest; none without friction.
     ///
     /// # Errors
     /// As [`Self::solve`].
@@ -130,7 +130,7 @@ impl CheckedSweep {
         Ok(self.losses(hardest, forces.as_ref(), stop)?.map(|losses| losses.totals))
     }
 
-    /// What friction takes, given the sweep of the hardest point; nothing without friction.
+    /// Returns the losses, given the sweep of the hardest point; none without friction.
     fn losses(
         &self,
         hardest: &solver::Sweep,
@@ -142,7 +142,7 @@ impl CheckedSweep {
         self.losses.as_ref().map(|parameters| of_duty.losses(parameters, hardest, forces, stop)).transpose()
     }
 
-    /// What the teeth push the wave generator aside with.
+    /// Returns the radial forces of the teeth on the wave generator.
     ///
     /// # Errors
     /// As [`Self::solve`].
@@ -154,7 +154,7 @@ impl CheckedSweep {
         period::RadialForces::of(&self.drive, self.load(), &self.deviations, sweep, stop)
     }
 
-    /// Solves, of a duty its hardest point.
+    /// Solves the sweep; for a duty, that of its hardest point.
     ///
     /// # Errors
     /// As [`solver::sweep_with_deviations`].
@@ -162,7 +162,7 @@ impl CheckedSweep {
         solver::sweep_with_deviations(&self.drive, self.load(), &self.deviations, self.points, stop)
     }
 
-    /// Solves for the peaks alone.
+    /// Solves for the peaks only.
     ///
     /// # Errors
     /// As [`Self::solve`].
@@ -174,7 +174,7 @@ impl CheckedSweep {
     }
 }
 
-/// The loads of a document of which the hardest was checked, as all others but their torques were.
+/// Returns the loads of a document. Only the hardest was checked: the others differ only in torque.
 fn checked_duty(duty: &design::Duty, hardest: &LoadCase) -> Result<Duty, NoAnswer> {
     let point = |&design::DutyPoint { torque, input_speed_rpm, share_of_time }: &design::DutyPoint| {
         let load = LoadCase::new(&LoadParameters { torque, ..*hardest.parameters() })?;
@@ -185,7 +185,7 @@ fn checked_duty(duty: &design::Duty, hardest: &LoadCase) -> Result<Duty, NoAnswe
     Ok(Duty { points, hardest: duty.hardest })
 }
 
-/// What is asked.
+/// Quantities that the request includes.
 #[derive(Debug)]
 pub struct Sweep;
 
@@ -205,7 +205,7 @@ impl Question for Sweep {
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {
         let mut violations = Vec::new();
         let draft = checked_drive(design, &mut violations)?;
-        // In the document's order: of structural faults the first is told.
+        // In the document's order: the first structural fault is reported.
         let load = checked_load(design, &draft, &mut violations)?;
         let losses = design.loss_parameters().unwrap_or_else(|found| {
             violations.extend(found);
@@ -257,12 +257,12 @@ impl Question for Sweep {
         let mesh = checked.load().mesh(&checked.drive, &checked.deviations);
         let Each { state_bytes, angle_bytes } = checked.each();
         let columns_bytes = mesh.state_count(samples) * state_bytes + (mesh.last_sample(samples) + 1) * angle_bytes;
-        // For plots the states are put in the order of their places: as much again.
+        // A plot sorts the states by position, which needs the same memory again.
         Some(if format == Format::Svg { 2 * columns_bytes } else { format.bytes_with_text(columns_bytes) })
     }
 
     fn is_short(checked: &CheckedSweep) -> bool {
-        /// They are solved and written in about 0.1 ms; with Palmgren's law and all that can be asked for in a quarter of a millisecond.
+        /// Solving and writing them takes about 0.1 ms; with Palmgren's law and all options 0.25 ms.
         const FEW_STATES: u64 = 400;
         let CheckedSweep { drive, deviations, losses, points, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
@@ -284,7 +284,7 @@ impl Question for Sweep {
         let asks_without_load = *with_wind_up && *with_gaps;
         let points = if asks_without_load { checked.points.also_without_load() } else { checked.points };
         let sweep = solver::sweep_with_deviations(drive, load, deviations, points, stop)?;
-        // Of a million states each of what follows takes tens of milliseconds.
+        // For a million states each of the following steps takes tens of milliseconds.
         let go_on = || if stop.stopped() { Err(NoAnswer::stopped()) } else { Ok(()) };
         go_on()?;
         let mesh = sweep.mesh;
@@ -386,7 +386,7 @@ impl DutyAnswer {
             DutyPointAnswer {
                 input_torque_nm: load.input_torque_nm(drive),
                 output_torque_nm: load.output_torque_nm(drive),
-                // Every point of a duty has one.
+                // Every point of a duty has a speed.
                 input_speed_rpm: input_speed_rpm.unwrap_or_default(),
                 share_of_time,
                 efficiency_ring_fixed: losses.map(|PointLosses { efficiency_ring_fixed, .. }| efficiency_ring_fixed),
@@ -401,20 +401,20 @@ impl DutyAnswer {
     }
 }
 
-/// A column of the states.
+/// Column of the states.
 #[derive(Debug, Clone, Copy)]
 pub enum Column<'a> {
     /// Numbers.
     Numbers(&'a [f64]),
     /// Whole numbers.
     Counts(&'a [u32]),
-    /// Whether something holds.
+    /// Booleans.
     Flags(&'a [bool]),
-    /// Where teeth roll.
+    /// Contacts at which teeth roll.
     Rolls(&'a [RollsAnswer]),
 }
 
-/// An entry of a column.
+/// Entry of a column.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Entry {
@@ -434,7 +434,7 @@ impl Forms for SweepAnswer {
 
     fn expected_bytes(&self) -> usize {
         let of_states: usize = self.columns().iter().map(|(_, column)| column.text_bytes()).sum();
-        // Columns that stand by input angle.
+        // Columns by input angle.
         let wind_up = self.wind_up.as_ref().map(|wind_up| 5 * wind_up.input_angle_deg.len());
         let losses = self.losses.as_ref().map(|losses| 4 * losses.by_input_angle.input_angle_deg.len());
         let radial_force = self.radial_force_n.as_ref().map(|force| 3 * force.input_angle_deg.len());
@@ -444,13 +444,13 @@ impl Forms for SweepAnswer {
 
     fn held_bytes(&self, format: Format) -> u64 {
         let columns_bytes = self.columns().iter().map(|(_, column)| column.bytes()).sum();
-        // For plots the states are put in the order of their places: as much again.
+        // A plot sorts the states by position, which needs the same memory again.
         if format == Format::Svg { 2 * columns_bytes } else { columns_bytes }
     }
 }
 
 impl Column<'_> {
-    /// About, as JSON.
+    /// Returns the approximate length as JSON.
     const fn text_bytes(&self) -> usize {
         match self {
             Self::Numbers(numbers) => NUMBER_TEXT_BYTES * numbers.len(),
@@ -481,7 +481,7 @@ impl Column<'_> {
 }
 
 impl SweepAnswer {
-    /// The columns of the states by their names in JSON, those of the slips after them.
+    /// Returns the columns of the states with their names in JSON; those of the slips come last.
     pub fn columns(&self) -> Vec<(&'static str, Column<'_>)> {
         let states = &self.states;
         let mut columns = vec![

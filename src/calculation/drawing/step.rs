@@ -1,8 +1,9 @@
-//! Drawings as STEP: every part one solid, made once, and an assembly of as many instances of each as there are; flanks as
-//! polynomials, swept along z, each a face, since CAD kernels sum the volume over such a face exactly and over splines of several do not.
+//! Drawings as STEP: each part is one solid, and the assembly has an instance for each placement. Flanks are
+//! polynomials, extruded along z. Each polynomial is a face, since CAD kernels integrate its volume exactly, but not
+//! that of a spline of several.
 //!
-//! A prism needs a few kinds of record only: planes, cylinders and extruded polynomials, and what joins them; a ball is two halves of a
-//! sphere. They are those of ISO 10303-214 (`AUTOMOTIVE_DESIGN`).
+//! A prism needs few kinds of record: planes, cylinders, extruded polynomials, and their topology. A ball is two halves
+//! of a sphere. The records are those of ISO 10303-214 (`AUTOMOTIVE_DESIGN`).
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -11,13 +12,13 @@ use super::answer::{BodyAnswer, BodyPart, BodySolid, DrawingAnswer, EdgeAnswer, 
 use super::svg;
 use crate::json;
 
-/// Digits of the design's hash in the names of parts: enough to tell designs apart in a tree, few enough to be read there.
+/// Digits of the design's hash in the names of parts: enough to distinguish designs, few enough to read in a tree view.
 const HASH_DIGITS: usize = 8;
 
 /// Writes a drawing.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let mut step = Step { writer, last: 0, shared: HashMap::new() };
     step.head(drawing)?;
@@ -34,10 +35,11 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     writeln!(step.writer, "ENDSEC;\nEND-ISO-10303-21;")
 }
 
-/// Points are written to a picometre: a ten-thousandth of what polynomials of the default chord tolerance leave their curves by.
+/// Resolution of points: one picometre, 1e-4 of the distance between a curve and its polynomials at the default chord
+/// tolerance.
 const LEAST_PER_MM: f64 = 1e9;
 
-/// A record's number.
+/// Number of a record.
 #[derive(Debug, Clone, Copy)]
 struct Id(u64);
 
@@ -47,7 +49,7 @@ impl std::fmt::Display for Id {
     }
 }
 
-/// What all products refer to.
+/// Records that all products refer to.
 struct Frame {
     product_context: Id,
     definition_context: Id,
@@ -55,7 +57,7 @@ struct Frame {
     origin: Id,
 }
 
-/// An edge of the bottom, as it is drawn on a prism: counter-clockwise around the material, which is on its left.
+/// Edge of the bottom of a prism: counter-clockwise around the material, which is on its left.
 enum Side {
     Line {
         end: [f64; 2],
@@ -66,7 +68,7 @@ enum Side {
         radius_mm: f64,
         is_counter_clockwise: bool,
     },
-    /// Along a polynomial, by Bézier's polygon.
+    /// Along a polynomial, by its Bézier control polygon.
     Curve(Vec<[f64; 2]>),
 }
 
@@ -79,26 +81,26 @@ impl Side {
     }
 }
 
-/// The corners and edges of one loop at one height.
+/// Corners and edges of one loop at one height.
 struct Level {
     z_mm: f64,
     corners: Vec<Id>,
     edges: Vec<Id>,
-    /// What lies under each edge.
+    /// Curve under each edge.
     curves: Vec<Id>,
 }
 
-/// What others refer to of a product.
+/// Records of a product that others refer to.
 struct Product {
     definition: Id,
     representation: Id,
 }
 
-/// The file as it is written: numbered records.
+/// Writer of the file: numbered records.
 struct Step<'a> {
     writer: &'a mut dyn Write,
     last: u64,
-    /// Points, directions and vectors, each written once.
+    /// Points, directions and vectors; each is written once.
     shared: HashMap<String, Id>,
 }
 
@@ -109,7 +111,7 @@ impl Step<'_> {
         Ok(Id(self.last))
     }
 
-    /// A record that stands for nothing but its value, so that who wants the same refers to the same one.
+    /// Writes a record that is only a value. Equal values share one record.
     fn shared(&mut self, text: String) -> io::Result<Id> {
         if let Some(&id) = self.shared.get(&text) {
             return Ok(id);
@@ -121,7 +123,7 @@ impl Step<'_> {
 
     fn head(&mut self, drawing: &DrawingAnswer) -> io::Result<()> {
         let title = svg::title(drawing);
-        // The same design is the same bytes, whenever it is drawn; so there is no date but the first.
+        // The same design gives the same bytes at any time, so the date is constant.
         writeln!(
             self.writer,
             "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(('{title}'),'2;1');\nFILE_NAME('{title}','1970-01-01T00:00:00',(''),(''),'toothwave {}','toothwave','');\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN {{ 1 0 10303 214 1 1 1 1 }}'));\nENDSEC;\nDATA;",
@@ -151,7 +153,7 @@ impl Step<'_> {
         Ok(Frame { product_context, definition_context, units, origin })
     }
 
-    /// A part, made once where its section is drawn.
+    /// Writes a part once, at its original position.
     fn part(&mut self, body: &BodyAnswer, hash: &str, frame: &Frame) -> io::Result<Product> {
         let (name, [red, green, blue]) = match body.part {
             BodyPart::WaveGenerator => ("wave_generator", [0.33, 0.62, 0.84]),
@@ -184,7 +186,7 @@ impl Step<'_> {
         self.product(&name, representation, frame)
     }
 
-    /// What names a shape.
+    /// Writes the records that name a shape.
     fn product(&mut self, name: &str, representation: Id, frame: &Frame) -> io::Result<Product> {
         let Frame { product_context, definition_context, .. } = frame;
         let product = self.record(format_args!("PRODUCT('{name}','{name}','',({product_context}))"))?;
@@ -197,7 +199,7 @@ impl Step<'_> {
         Ok(Product { definition, representation })
     }
 
-    /// The parts in place: of each as many instances as there are placements.
+    /// Writes the placed parts, with one instance for each placement.
     fn assembly(&mut self, name: &str, components: &[(&BodyAnswer, Product)], frame: &Frame) -> io::Result<()> {
         let Frame { units, origin, .. } = frame;
         let mut places = Vec::new();
@@ -232,7 +234,7 @@ impl Step<'_> {
         Ok(())
     }
 
-    /// A prism from z = 0 up: a face on every edge, a bottom and a top.
+    /// Writes a prism from z = 0 upward: a face on every edge, a bottom and a top.
     fn prism(&mut self, body: &BodyAnswer, name: &str) -> io::Result<Id> {
         let outer = (sides(&body.outer, false), "FACE_OUTER_BOUND");
         let holes = body.holes.iter().map(|hole| (sides(hole, true), "FACE_BOUND"));
@@ -255,7 +257,7 @@ impl Step<'_> {
         self.record(format_args!("MANIFOLD_SOLID_BREP('{name}',{shell})"))
     }
 
-    /// A ball around a place on the z axis: two halves that meet along a great circle through its poles.
+    /// Writes a ball around a point on the z axis: two halves that meet along a great circle through its poles.
     fn ball(&mut self, radius_mm: f64, center_z_mm: f64, name: &str) -> io::Result<Id> {
         let (center, y) = ([0.0, 0.0, center_z_mm], [0.0, 1.0, 0.0]);
         let place = self.placement(center, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
@@ -265,7 +267,7 @@ impl Step<'_> {
             let point = self.point([0.0, 0.0, z_mm])?;
             poles.push(self.record(format_args!("VERTEX_POINT('',{point})"))?);
         }
-        // Each from the lower pole to the upper one, through +x and through -x.
+        // Each runs from the lower pole to the upper one, through +x and through -x.
         let mut meridians = Vec::new();
         for x in [1.0, -1.0] {
             let place = self.placement(center, y.map(|y| -x * y), [x, 0.0, 0.0])?;
@@ -273,7 +275,8 @@ impl Step<'_> {
             meridians.push(self.record(format_args!("EDGE_CURVE('',{},{},{circle},.T.)", poles[0], poles[1]))?);
         }
         let mut faces = Vec::new();
-        // Seen from outside the half towards -y has +x on its right, so that it runs up along +x; the other one runs up along -x.
+        // Seen from outside, the half towards -y has +x on its right, so it runs up along +x. The other half runs up
+        // along -x.
         for (up, down) in [(meridians[0], meridians[1]), (meridians[1], meridians[0])] {
             let around = self.edge_loop([(up, true), (down, false)])?;
             let bound = self.record(format_args!("FACE_OUTER_BOUND('',{around},.T.)"))?;
@@ -283,7 +286,7 @@ impl Step<'_> {
         self.record(format_args!("MANIFOLD_SOLID_BREP('{name}',{shell})"))
     }
 
-    /// The corners of a loop at a height, and its edges between them.
+    /// Writes the corners of a loop at a height, and the edges between them.
     fn level(&mut self, sides: &[Side], z_mm: f64) -> io::Result<Level> {
         let mut corners = Vec::new();
         for side in sides {
@@ -291,7 +294,7 @@ impl Step<'_> {
             let point = self.point([x, y, z_mm])?;
             corners.push(self.record(format_args!("VERTEX_POINT('',{point})"))?);
         }
-        // Each side ends at the corner of its index and starts at the one before.
+        // Each side ends at the corner of its index and starts at the previous one.
         corners.rotate_right(1);
         let (mut edges, mut curves) = (Vec::new(), Vec::new());
         for (index, side) in sides.iter().enumerate() {
@@ -304,7 +307,7 @@ impl Step<'_> {
         Ok(Level { z_mm, corners, edges, curves })
     }
 
-    /// The curve under an edge, and whether the edge runs along it.
+    /// Writes the curve under an edge. Returns it and `.T.` if the edge has the same direction.
     fn curve(&mut self, side: &Side, start: [f64; 2], z_mm: f64) -> io::Result<(Id, &'static str)> {
         match side {
             Side::Line { end } => {
@@ -330,7 +333,7 @@ impl Step<'_> {
         }
     }
 
-    /// The faces that stand on the edges of a loop; seen from outside each runs along the bottom, up, back and down.
+    /// Writes the faces on the edges of a loop. Seen from outside, each runs along the bottom, up, back and down.
     fn walls(&mut self, sides: &[Side], bottom: &Level, top: &Level) -> io::Result<Vec<Id>> {
         let mut uprights = Vec::new();
         for (index, (&from, &to)) in bottom.corners.iter().zip(&top.corners).enumerate() {
@@ -356,7 +359,8 @@ impl Step<'_> {
         Ok(faces)
     }
 
-    /// The surface over an edge, and whether its normal points out of the material, to the right of the edge.
+    /// Writes the surface over an edge. Returns it and `.T.` if its normal points out of the material, to the right of
+    /// the edge.
     fn surface(&mut self, side: &Side, start: [f64; 2], bottom: &Level, curve: Id) -> io::Result<(Id, &'static str)> {
         match side {
             Side::Line { end } => {
@@ -372,7 +376,7 @@ impl Step<'_> {
             }
             Side::Curve(_) => {
                 let sweep = self.vector([0.0, 0.0, 1.0])?;
-                // Its normal is that of the curve's direction times z.
+                // The normal is the curve's direction times z.
                 Ok((self.record(format_args!("SURFACE_OF_LINEAR_EXTRUSION('',{curve},{sweep})"))?, ".T."))
             }
         }
@@ -392,7 +396,7 @@ impl Step<'_> {
         self.record(format_args!("LINE('',{point},{vector})"))
     }
 
-    /// Of length one.
+    /// Writes a unit vector.
     fn vector(&mut self, direction: [f64; 3]) -> io::Result<Id> {
         let direction = self.direction(direction)?;
         self.shared(format!("VECTOR('',{direction},1.)"))
@@ -414,7 +418,7 @@ impl Step<'_> {
     }
 }
 
-/// The sides of a prism over an outline; those of a hole run clockwise, so that the material is on their left too.
+/// Returns the sides of a prism over an outline. Those of a hole run clockwise, so the material is on their left too.
 fn sides(outline: &OutlineAnswer, is_hole: bool) -> Vec<Side> {
     let mut sides: Vec<_> = match outline {
         OutlineAnswer::Circle { radius_mm } => {
@@ -424,7 +428,8 @@ fn sides(outline: &OutlineAnswer, is_hole: bool) -> Vec<Side> {
                 radius_mm: *radius_mm,
                 is_counter_clockwise: !is_hole,
             };
-            // Halves, because an edge from a corner to itself is not every reader's strength. A hole's are the same ones.
+            // Two halves, because some readers do not support an edge from a corner to itself. A hole has the same
+            // halves.
             return vec![half(-radius_mm), half(*radius_mm)];
         }
         OutlineAnswer::Path { edges } => edges
@@ -461,7 +466,7 @@ fn list(ids: &[Id]) -> String {
     ids.iter().map(Id::to_string).collect::<Vec<_>>().join(",")
 }
 
-/// A number as STEP spells it: always with a point, its exponent after a capital E.
+/// Number in STEP notation: always with a point, its exponent after a capital E.
 struct Real(f64);
 
 impl std::fmt::Display for Real {

@@ -6,13 +6,13 @@ use super::answer::DrawingAnswer;
 use super::mesh::Mesh;
 use super::svg;
 
-/// Bytes before the number of triangles: of any content but `solid`, which begins a text.
+/// Bytes before the number of triangles. They may have any content except `solid`, which marks a text file.
 const HEAD_BYTES: usize = 80;
 
 /// Writes a drawing.
 ///
 /// # Errors
-/// Those of the writer; more triangles than STL counts.
+/// The errors of the writer, and an error for more triangles than STL can count.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let meshes: Vec<_> = drawing.bodies.iter().map(|body| Mesh::new(body, drawing.chord_tolerance_mm)).collect();
     let bodies = || drawing.bodies.iter().zip(&meshes);
@@ -36,7 +36,7 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     Ok(())
 }
 
-/// Its normal, its corners and two bytes without a meaning.
+/// Writes the normal, the corners and two unused bytes.
 fn write_triangle(corners_mm: [[f64; 3]; 3], writer: &mut dyn Write) -> io::Result<()> {
     let [a, b, c] = corners_mm;
     let (u, v) = (minus(b, a), minus(c, a));
@@ -54,7 +54,7 @@ fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// In the precision of STL.
+/// Rounds to the precision of STL.
 #[expect(clippy::cast_possible_truncation, reason = "seven digits are what is wanted")]
 pub(super) const fn single(number: f64) -> f32 {
     number as f32

@@ -4,13 +4,13 @@ use std::io::{self, Write};
 
 use super::answer::{BodyAnswer, BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
 
-/// Share of the picture that is left free around the drawing.
+/// Margin around the drawing, as a share of the picture.
 const MARGIN: f64 = 0.03;
 
 /// Writes a drawing.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let reach_mm = reach_mm(&drawing.bodies) * (1.0 + MARGIN);
     let size_mm = 2.0 * reach_mm;
@@ -45,13 +45,13 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     writeln!(writer, "</g>\n</svg>")
 }
 
-/// What stands in a drawing about itself.
+/// Returns the title of a drawing.
 pub(super) fn title(drawing: &DrawingAnswer) -> String {
     let DrawingAnswer { solver_version, design_hash, .. } = drawing;
     format!("toothwave {solver_version}, {}, design {design_hash}", crate::json::word(&drawing.subject))
 }
 
-/// The farthest that a drawing reaches from its origin.
+/// Returns the largest distance of a drawing's points from its origin.
 pub(super) fn reach_mm(bodies: &[BodyAnswer]) -> f64 {
     let of_edge = |edge: &EdgeAnswer| match edge {
         EdgeAnswer::Line { x_mm, y_mm } => farthest(x_mm, y_mm),

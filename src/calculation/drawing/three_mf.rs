@@ -1,4 +1,5 @@
-//! Drawings as 3MF (core specification 1.3), in millimetres: an archive with each body as an object once, and an item for each place where it stands.
+//! Drawings as 3MF (core specification 1.3), in millimetres: an archive with each body once as an object, and one item
+//! for each placement.
 
 use std::io::{self, Cursor, Write};
 
@@ -22,10 +23,10 @@ const RELATIONSHIPS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 /// Writes a drawing.
 ///
 /// # Errors
-/// Those of the writer and of the archive.
+/// The errors of the writer and of the archive.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    // Files of an archive have a date; the default one is always the same, so the same design is the same bytes.
+    // Files of an archive have a date. The default one is constant, so the same design gives the same bytes.
     let options = SimpleFileOptions::default();
     for (name, text) in [("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONSHIPS)] {
         archive.start_file(name, options)?;
@@ -55,7 +56,7 @@ fn write_model(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()
         for PlacementAnswer { x_mm, y_mm, rotation_deg } in &body.placements {
             let (sin, cos) = rotation_deg.to_radians().sin_cos();
             let id = 1 + index;
-            // The rows are where x, y, z and the origin go.
+            // The rows are the images of x, y, z and the origin.
             writeln!(
                 writer,
                 r#"<item objectid="{id}" transform="{cos} {sin} 0 {} {cos} 0 0 0 1 {x_mm} {y_mm} 0"/>"#,

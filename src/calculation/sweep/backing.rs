@@ -1,4 +1,4 @@
-//! Estimates of what gives way behind the contacts, as they go over the wire.
+//! Estimated compliance of the supports behind the contacts, in JSON.
 
 use std::io::{self, Write};
 
@@ -9,19 +9,19 @@ use utoipa::ToSchema;
 
 use crate::json::word;
 
-/// An estimate of what gives way behind a contact (docs/explanation/theory.md section 4.10).
+/// Estimated compliance of a part behind a contact (docs/explanation/theory.md section 4.10).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct EstimateAnswer {
     /// The contact.
     pub contact: Contact,
-    /// What gives way behind it.
+    /// Compliant part behind the contact.
     pub backing: Backing,
-    /// How far the contact gives way besides, for each newton there, beyond the depth that its law counts to.
+    /// Additional displacement of the contact per newton, beyond the depth that the contact's law includes.
     pub compliance_mm_per_n: f64,
-    /// Whether the parts are held so as far as `parts` says; where it says nothing, as the stiffer of the two.
+    /// True if this support is the one in `parts`. If `parts` does not specify it, the stiffer of the two applies.
     pub is_as_held: bool,
-    /// What it adds to the approach of a tooth at its three contacts, over that, of cylinders whose parts are held so under `johnson`; left out where the
-    /// designer gives a series compliance there.
+    /// Share that it adds to the approach of a tooth at its three contacts, for cylinders with this support under
+    /// `johnson`. Left out if the design gives a series compliance there.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub share: Option<f64>,

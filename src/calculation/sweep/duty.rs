@@ -1,17 +1,19 @@
-//! The points of a duty as they go over the wire.
+//! Points of a duty in JSON.
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Several loads in turn. What may be averaged over them, and why:
+/// Several loads in sequence. Averages over the points of a duty:
 ///
-/// - Power lost is a mean over time, since energies add; efficiency is energy out over energy in, so each point's loss ratio counts by its
-///   power without friction.
-/// - Wear is a mean over time at each place of a part, since depths add where they are: the mean of two points' largest depths, which may stand at
-///   different places, would be too large.
-/// - A bearing's load counts by revolutions and with the exponent of its life: so each point uses up its share of the life that it would have alone.
-/// - Nothing else is averaged. Forces, stresses, states, wind-up, radial force, slip and the torque that the wave generator needs are those of the
-///   hardest point, and pressure times velocity is the largest of any: no other point makes them less. The torque capacity hangs on no load.
+/// - Power lost is a mean over time, since energies add. Efficiency is energy out over energy in, so each point's loss
+///   ratio is weighted by its power without friction.
+/// - Wear is a mean over time at each place of a part, since depths add at each place. The mean of two points' largest
+///   depths would be too large, because these may be at different places.
+/// - A bearing's load is weighted by revolutions and with the exponent of its life. Each point uses its share of the
+///   life that the bearing would have under this point alone.
+/// - Nothing else is averaged. Forces, stresses, states, wind-up, radial force, slip and the required torque of the wave
+///   generator are those of the hardest point. Pressure times velocity is the largest of all points, since no other
+///   point reduces it. The torque capacity does not depend on the load.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct DutyAnswer {
     /// The point with the largest torque, counted from 0.
@@ -27,7 +29,7 @@ pub struct DutyAnswer {
 pub struct DutyPointAnswer {
     /// Torque at the wave generator, losses neglected.
     pub input_torque_nm: f64,
-    /// At the carrier.
+    /// Torque at the carrier.
     pub output_torque_nm: f64,
     /// Speed of the wave generator.
     pub input_speed_rpm: f64,
@@ -37,7 +39,7 @@ pub struct DutyPointAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub efficiency_ring_fixed: Option<f64>,
-    /// Power lost while it runs, ring fixed, given `friction`.
+    /// Power lost while this point runs, ring fixed, given `friction`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub power_loss_w: Option<f64>,

@@ -1,4 +1,4 @@
-//! What friction takes, and what pushes the wave generator aside, as they go over the wire.
+//! Friction losses and radial forces on the wave generator in JSON.
 
 use std::io::{self, Write};
 
@@ -15,18 +15,18 @@ use crate::json::word;
 use crate::no_answer::NoAnswer;
 use crate::question::require_finite;
 
-/// What friction takes, to first order in its coefficients; given `friction`.
+/// Friction losses, to first order in the coefficients; given `friction`.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LossesAnswer {
-    /// What there is one number of.
+    /// Totals over the period or the duty.
     #[serde(flatten)]
     pub totals: LossTotals,
-    /// How fast the tooth's surface slips over the part's, along the counter-clockwise tangent, per radian of wave generator against carrier;
-    /// at a race over the race. One entry a state.
+    /// Slip of the tooth's surface over the part's, along the counter-clockwise tangent, per radian of wave generator
+    /// against carrier; with a race, over the race. One entry per state.
     pub slip_mm_per_rad: PerContact<Vec<f64>>,
-    /// The contact at which the tooth rolls, one entry a state.
+    /// The contact at which the tooth rolls, one entry per state.
     pub rolls: Vec<RollsAnswer>,
-    /// The same at each input angle.
+    /// Losses at each input angle.
     pub by_input_angle: LossesByInputAngleAnswer,
 }
 
@@ -40,34 +40,36 @@ pub enum RollsAnswer {
     Ring,
     /// At the carrier.
     Carrier,
-    /// At none: it cannot spin, carries nothing or has no friction.
+    /// At no contact: it cannot spin, carries no load or has no friction.
     Nowhere,
 }
 
-/// Columns of equal length, one entry an input angle; where a tooth enters an angle may stand twice, without it and with it.
+/// Columns of equal length, one entry per input angle. An angle may occur twice where a tooth enters: without it and
+/// with it.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LossesByInputAngleAnswer {
     /// Input angle j.
     pub input_angle_deg: Vec<f64>,
     /// Power lost over the input torque times the speed of wave generator against carrier.
     pub loss_ratio: Vec<f64>,
-    /// The efficiencies there.
+    /// Efficiencies at each input angle.
     pub efficiency: Efficiencies<Vec<f64>>,
 }
 
-/// What the teeth push the wave generator aside with, where no two lobes are loaded alike: columns of equal length, one entry an input angle.
+/// Radial force of the teeth on the wave generator, if no two lobes carry the same load: columns of equal length, one
+/// entry per input angle.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct RadialForceAnswer {
     /// Input angle j.
     pub input_angle_deg: Vec<f64>,
-    /// The force, in N.
+    /// Magnitude of the force, in N.
     pub value: Vec<f64>,
-    /// Its direction in the wave generator's frame, from the middle of lobe 0.
+    /// Direction of the force in the wave generator's frame, from the middle of lobe 0.
     pub direction_deg: Vec<f64>,
 }
 
 impl LossesAnswer {
-    /// The losses over all points of a duty, with the columns of the hardest, whose sweep this is.
+    /// Creates the losses over all points of a duty, with the columns of the hardest point, whose sweep this is.
     pub(super) fn new(
         mechanism: &Mechanism,
         totals: LossTotals,
@@ -92,7 +94,7 @@ impl LossesAnswer {
     }
 }
 
-/// All that the others follow from by finite means.
+/// Returns the numbers whose finiteness implies that of all others.
 fn numbers(totals: &LossTotals) -> Vec<f64> {
     let LossTotals { loss_ratio, efficiency_error, required_input_torque_nm, efficiency, .. } = totals;
     let mut numbers =
@@ -107,7 +109,7 @@ fn numbers(totals: &LossTotals) -> Vec<f64> {
     numbers
 }
 
-/// A contact in words.
+/// Returns the name of a contact in words.
 fn name(contact: Contact) -> String {
     word(&RollsAnswer::from(Some(contact))).replace('_', " ")
 }
@@ -128,7 +130,7 @@ pub(super) fn write_text(totals: &LossTotals, writer: &mut dyn Write) -> io::Res
     for (name, ratio) in
         [("wave generator", wave_generator), ("ring", ring), ("carrier", carrier), ("bearing", bearing)]
     {
-        // Without friction there is no share of it.
+        // Without friction there is no share of the loss.
         let share = if totals.loss_ratio > 0.0 { ratio / totals.loss_ratio } else { 0.0 };
         writeln!(writer, "  of it at the {name:<14}         {:>6.2} %", percent(share))?;
     }

@@ -1,4 +1,4 @@
-//! How far the model is off elastic bodies, for a terminal.
+//! Model error relative to elastic bodies, as text.
 
 use std::io::{self, Write};
 
