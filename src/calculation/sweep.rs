@@ -121,7 +121,7 @@ impl CheckedSweep {
     /// Returns the loss totals over all points of a duty, given the sweep of the hardest; none without friction.
     ///
     /// # Errors
-    /// As [`Self::solve`].
+    /// The errors of [`Self::solve`].
     pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotals>, SolveError> {
         let forces = match self.losses {
             Some(LossParameters { bearing: Some(_), .. }) => self.radial_forces(hardest, stop)?,
@@ -145,7 +145,7 @@ impl CheckedSweep {
     /// Returns the radial forces of the teeth on the wave generator.
     ///
     /// # Errors
-    /// As [`Self::solve`].
+    /// The errors of [`Self::solve`].
     pub fn radial_forces(
         &self,
         sweep: &solver::Sweep,
@@ -157,7 +157,7 @@ impl CheckedSweep {
     /// Solves the sweep; for a duty, that of its hardest point.
     ///
     /// # Errors
-    /// As [`solver::sweep_with_deviations`].
+    /// The errors of [`solver::sweep_with_deviations`].
     pub fn solve(&self, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
         solver::sweep_with_deviations(&self.drive, self.load(), &self.deviations, self.points, stop)
     }
@@ -165,7 +165,7 @@ impl CheckedSweep {
     /// Solves for the peaks only.
     ///
     /// # Errors
-    /// As [`Self::solve`].
+    /// The errors of [`Self::solve`].
     pub fn peaks(&self, stop: &dyn Stop) -> Result<solver::SweepPeaks, SolveError> {
         if !self.deviations.is_nil() {
             return Ok((&self.solve(stop)?).into());
@@ -174,7 +174,7 @@ impl CheckedSweep {
     }
 }
 
-/// Returns the loads of a document. Only the hardest was checked: the others differ only in torque.
+/// Returns the loads of a document. The hardest is already checked; the others differ from it only in torque.
 fn checked_duty(duty: &design::Duty, hardest: &LoadCase) -> Result<Duty, NoAnswer> {
     let point = |&design::DutyPoint { torque, input_speed_rpm, share_of_time }: &design::DutyPoint| {
         let load = LoadCase::new(&LoadParameters { torque, ..*hardest.parameters() })?;
@@ -185,7 +185,7 @@ fn checked_duty(duty: &design::Duty, hardest: &LoadCase) -> Result<Duty, NoAnswe
     Ok(Duty { points, hardest: duty.hardest })
 }
 
-/// Quantities that the request includes.
+/// Question: forces and contact stresses over one period.
 #[derive(Debug)]
 pub struct Sweep;
 

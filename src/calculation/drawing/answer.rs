@@ -121,7 +121,7 @@ impl From<Part> for BodyPart {
 pub enum OutlineAnswer {
     /// A circle around the origin.
     Circle {
-        /// Its radius.
+        /// Radius of the circle.
         radius_mm: f64,
     },
     /// Consecutive edges.

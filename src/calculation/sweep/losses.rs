@@ -34,13 +34,13 @@ pub struct LossesAnswer {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RollsAnswer {
-    /// At the wave generator, or its race.
+    /// Rolls at the wave generator, or its race.
     WaveGenerator,
-    /// At the ring.
+    /// Rolls at the ring.
     Ring,
-    /// At the carrier.
+    /// Rolls at the carrier.
     Carrier,
-    /// At no contact: it cannot spin, carries no load or has no friction.
+    /// Rolls at no contact: it cannot spin, carries no load or has no friction.
     Nowhere,
 }
 

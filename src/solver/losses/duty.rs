@@ -153,7 +153,7 @@ impl DutySweep<'_> {
     /// the wave generator.
     ///
     /// # Errors
-    /// As [`sweep_with_deviations`].
+    /// The errors of [`sweep_with_deviations`].
     pub fn losses(
         &self,
         parameters: &LossParameters,

@@ -135,7 +135,7 @@ impl Losses {
     /// Returns the same with the mean to a tolerance relative to the total, independent of the sweep's input angles.
     ///
     /// # Errors
-    /// As [`Self::of`].
+    /// The errors of [`Self::of`].
     pub fn with_mean_to(
         self,
         tolerance: f64,
@@ -211,7 +211,7 @@ impl Wear {
     /// Returns the wear of the sweep that these losses belong to.
     ///
     /// # Errors
-    /// As [`Losses::of`].
+    /// The errors of [`Losses::of`].
     pub fn of(
         drive: &Drive,
         load: &LoadCase,
@@ -328,7 +328,7 @@ impl BearingLoad {
 pub struct RadialForces {
     /// Magnitude of the force.
     pub force_n: Vec<f64>,
-    /// Its direction from the middle of lobe 0.
+    /// Direction of the force, from the middle of lobe 0.
     pub direction_deg: Vec<f64>,
 }
 
@@ -337,7 +337,7 @@ impl RadialForces {
     /// that the forces balance at any load.
     ///
     /// # Errors
-    /// As [`Losses::of`].
+    /// The errors of [`Losses::of`].
     pub fn of(
         drive: &Drive,
         load: &LoadCase,
