@@ -115,12 +115,12 @@ impl Text {
                 format!(
                     "the bore ends the flank before its natural tip: teeth start to touch it {starts_deg:.4} deg from {lobe} and take load at once, so loads jump unless corners carry"
                 ),
-                "bore less, or not at all, where the jump matters",
+                "if the jump matters, use a smaller bore or none",
             ),
             Code::BoreWithoutEffect => text(
                 &[TIP_RADIUS],
                 "mm",
-                "the bore lies inside the ring's natural tips and takes nothing away",
+                "the bore lies inside the ring's natural tips and removes nothing",
                 "leave it out, or bore beyond the natural tip radius",
             ),
             Code::FewTeethInMesh => text(
@@ -158,7 +158,7 @@ impl Text {
             Code::HollowWaveGenerator => text(
                 &["/drive/wave_generator/amplitude_mm"],
                 "mm",
-                "the wave generator is hollow between its lobes: a solid one turns, but the ring of a bearing could not follow it",
+                "the wave generator is concave between its lobes: a solid cam works, but the ring of a bearing cannot follow it",
                 "for a bearing choose a smaller amplitude or a larger path",
             ),
             Code::FlatCutsTheContact => text(
@@ -186,19 +186,19 @@ impl Text {
             Code::LinearLawTooStiff => text(
                 &["/model/stiffness/law"],
                 "µm",
-                "under the peak force the linear law lets the wave generator's contact approach by far less than real line contacts do: wind-up comes out too small and the effect of clearances too large",
+                "under the peak force the linear law's deflection of the wave generator's contact is far smaller than that of real line contacts: wind-up comes out too small and the effect of clearances too large",
                 "choose `virtual_work` with the law `johnson`, or the law `fixed` with stiffnesses of your own",
             ),
             Code::ProjectionOnSteepFlank => text(
                 &["/model/compatibility"],
                 "deg",
-                "`projection` adds the approaches up along one direction, which holds where the ring's flank is flat: on a flank as steep as this elastic bodies have smaller peak forces, by 8 to 15 % in the drives that were calculated, and the tooth that just enters by more",
-                "choose `virtual_work`, unless the paper's results are wanted",
+                "`projection` adds the approaches along one direction, which is valid for a flat ring flank: on a flank as steep as this, elastic bodies have peak forces that are 8 to 15 % smaller in the calculated drives, and the difference is larger for a tooth that just enters",
+                "choose `virtual_work`, unless you want the paper's results",
             ),
             Code::ProjectionWithGap => text(
                 &["/model/compatibility", "/parts"],
                 "µm",
-                "`projection` does not weigh a gap by the work done there: forces and wind-up come out far from those of elastic bodies",
+                "`projection` does not weight a gap by the work done there: forces and wind-up differ much from those of elastic bodies",
                 "choose `virtual_work`",
             ),
             Code::SlenderFingers => text(
@@ -226,16 +226,16 @@ impl Text {
             Code::PalmgrenBeyondSteel => text(
                 &["/model/stiffness/law", "/materials/teeth", &mate],
                 "GPa",
-                format!("Palmgren's law holds for steel on steel, and the contact modulus at the {at} is another"),
+                format!("Palmgren's law is valid for steel on steel, but the contact modulus at the {at} differs"),
                 "choose `virtual_work` with the law `johnson`, which follows the modulus",
             ),
             Code::JohnsonBeyondHalfWidth => text(
                 &["/model/stiffness/law", LOAD, RADIUS],
                 "mm",
                 format!(
-                    "half the contact's width at the {at} exceeds a tenth of the tooth's radius or of the depth: Johnson's law, which takes contacts for narrow, begins to err"
+                    "half the contact's width at the {at} exceeds a tenth of the tooth's radius or of the depth: Johnson's law assumes narrow contacts and becomes inaccurate"
                 ),
-                "lower the torque, widen the teeth, or take a stiffer material",
+                "lower the torque, widen the teeth, or choose a stiffer material",
             ),
             Code::WindUpBeyondModel if causes.wave_generator_moves => text(
                 &[LOAD, "/model"],
@@ -246,7 +246,7 @@ impl Text {
             Code::WindUpBeyondModel => text(
                 &[LOAD, "/model"],
                 "deg",
-                "under the load the wave generator turns by more than a tenth of the period: the teeth then stand elsewhere than the model, which takes lever arms and directions from the drive without load, has them",
+                "under the load the wave generator turns by more than a tenth of the period: the model uses lever arms and directions of the unloaded drive, but the loaded teeth are no longer there",
                 "lower the torque, close the clearances, or let the wave generator move, by `virtual_work`",
             ),
             Code::NegativeBacklash => {
@@ -340,18 +340,18 @@ impl Text {
                 &["/friction"],
                 "",
                 "friction alters the normal forces themselves, which losses to first order leave out: an exact equilibrium may have an efficiency that is off by as much as this",
-                "let the teeth run on a bearing, or take the efficiency for a tendency",
+                "let the teeth run on a bearing, or use the efficiency only as a tendency",
             ),
             Code::BearingLoadAboveHalfRating => text(
                 &["/friction/wave_generator/bearing_load_rating_n", LOAD],
                 "N",
-                "the load on the bearing exceeds half its dynamic load rating, up to which the equation of its life holds (ISO 281:2007): it may last less long than calculated",
+                "the load on the bearing exceeds half its dynamic load rating, the limit of its life equation (ISO 281:2007): its life may be shorter than calculated",
                 "choose a bearing with a larger load rating, or lower the torque",
             ),
             Code::StressAboveAllowable => text(
                 &[&["/load/allowable_stress_mpa"], stressed, &[&*mate]].concat(),
                 "MPa",
-                format!("the contact stress at the {at} exceeds the one that it may have"),
+                format!("the contact stress at the {at} exceeds its allowable stress"),
                 format!("lower the torque, {widen}, let more of them mesh, or choose a stronger material"),
             ),
             Code::StressAboveFatigueLimit => text(
@@ -385,7 +385,7 @@ impl FindingAnswer {
             value: clearance_um + modification_um,
             limit: clearance_um,
             unit: "µm".into(),
-            advice: "leave one of them out, unless both are meant".into(),
+            advice: "remove one of them, unless you want both".into(),
         }
     }
 
