@@ -80,7 +80,9 @@ pub fn tree(text: &[u8]) -> Result<Tree, ReadError> {
                 });
                 ReadError::Fault(Fault { pointer: pointer.collect(), code, detail: detail.into() })
             }
-            (_, Err(malformed)) => ReadError::Malformed { detail: malformed.to_string() },
+            (_, Err(malformed)) => {
+                ReadError::Malformed { detail: format!("{malformed}. Send one complete JSON document") }
+            }
             (None, Ok(_)) => ReadError::Malformed { detail: error.inner().to_string() },
         }
     })?;

@@ -110,6 +110,17 @@ pub struct MeasuredCase {
     pub has_pointed_tips: bool,
 }
 
+impl MeasuredCase {
+    const fn new(
+        compatibility: Compatibility,
+        law: LawName,
+        [ring_teeth_bend, wave_generator_moves, corner_contact]: [bool; 3],
+        Case { has_gaps, has_pointed_tips }: Case,
+    ) -> Self {
+        Self { compatibility, law, ring_teeth_bend, wave_generator_moves, corner_contact, has_gaps, has_pointed_tips }
+    }
+}
+
 /// What was measured of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
@@ -289,37 +300,21 @@ struct Row {
 const fn row(
     compatibility: Compatibility,
     law: LawName,
-    [ring_teeth_bend, wave_generator_moves, corner_contact]: [bool; 3],
+    refinements: [bool; 3],
     [has_pointed_tips, has_gaps]: [bool; 2],
     percent: [[i32; 2]; 3],
 ) -> Row {
-    let case = MeasuredCase {
-        compatibility,
-        law,
-        ring_teeth_bend,
-        wave_generator_moves,
-        corner_contact,
-        has_gaps,
-        has_pointed_tips,
-    };
+    let case = MeasuredCase::new(compatibility, law, refinements, Case { has_gaps, has_pointed_tips });
     Row { case, percent }
 }
 
 /// What was measured of a model in such a case; nothing of a model that was not held against finite elements.
-pub fn measured(load: &LoadParameters, Case { has_gaps, has_pointed_tips }: Case) -> Option<Measured> {
+pub fn measured(load: &LoadParameters, case: Case) -> Option<Measured> {
     let LoadParameters { compatibility, law, ring_teeth_bend, wave_generator_moves, corner_contact, .. } = *load;
-    let law = law.name();
-    let case = MeasuredCase {
-        compatibility,
-        law,
-        ring_teeth_bend,
-        wave_generator_moves,
-        corner_contact,
-        has_gaps,
-        has_pointed_tips,
-    };
-    // Corners are touched at pointed tips only.
-    let wanted = MeasuredCase { corner_contact: corner_contact && has_pointed_tips, ..case };
+    let refinements = [ring_teeth_bend, wave_generator_moves, corner_contact];
+    let case = MeasuredCase::new(compatibility, law.name(), refinements, case);
+    // Teeth touch corners at pointed tips only.
+    let wanted = MeasuredCase { corner_contact: corner_contact && case.has_pointed_tips, ..case };
     let [force, stress, wind_up] =
         MEASURED.iter().find(|row| row.case == wanted)?.percent.map(|[low, high]| ErrorRange::percent(low, high));
     Some(Measured { case, force, stress, wind_up })

@@ -5,7 +5,7 @@
 //! objective always stays. So further points never worsen the best value of an objective. While these best points stay
 //! the same, the hypervolume does not fall.
 
-use crate::optimise::Point;
+use crate::point::Point;
 
 /// Most objectives.
 pub(crate) const MOST_OBJECTIVES: usize = 4;
@@ -195,7 +195,8 @@ fn hypervolume(points: &mut [Place], corner: &Place, objectives: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{Front, MOST_OBJECTIVES, Place, hypervolume};
-    use crate::optimise::{Judged, Point, merged};
+    use crate::optimise::merged;
+    use crate::point::{Judged, Point};
     use crate::random::Stream;
 
     fn point(objectives: Vec<f64>) -> Point {

@@ -17,6 +17,7 @@ mod map;
 pub mod optimise;
 mod part_file;
 mod part_folder;
+mod point;
 mod quantity;
 mod random;
 mod rank;

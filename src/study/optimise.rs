@@ -12,9 +12,8 @@
 //! If half of the evaluations found no feasible point, each limit gets its own population. There the smaller violation
 //! of the other limits is better, then the smaller violation of this limit.
 
-use serde::{Deserialize, Serialize};
-
 use crate::front::Front;
+use crate::point::Point;
 use crate::random::Stream;
 
 /// Size of a population.
@@ -36,34 +35,6 @@ const LEAST_JUDGED_ANEW: usize = 8;
 /// twice those of K. Deb's NSGA-II, because parents from the archive are already near the front.
 const CROSSOVER_INDEX: f64 = 30.0;
 const MUTATION_INDEX: f64 = 40.0;
-
-/// Evaluation of a point.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Judged {
-    /// Objectives, all to be minimised.
-    pub objectives: Vec<f64>,
-    /// Violation of each limit as a fraction of it; 0 if the limit is met.
-    pub violations: Vec<f64>,
-}
-
-/// A point with its evaluation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Point {
-    /// Position in the unit cube.
-    pub place: Vec<f64>,
-    /// Evaluation.
-    pub judged: Judged,
-    /// Further values of the caller.
-    pub values: Vec<f64>,
-}
-
-impl Point {
-    /// Estimated heap memory in bytes.
-    pub(crate) fn bytes(&self) -> usize {
-        let Judged { violations, objectives } = &self.judged;
-        [&self.place, violations, objectives, &self.values].iter().map(|of| size_of_val(of.as_slice())).sum()
-    }
-}
 
 /// Lengths of the stages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,30 +70,6 @@ pub struct Optimiser {
     /// The population of the last proposed point, and the member that it may replace.
     population: usize,
     parent: Option<usize>,
-}
-
-impl Judged {
-    fn is_good(&self) -> bool {
-        self.violations.iter().all(|&violation| violation <= 0.0)
-    }
-
-    /// Returns the sum of the violations without the relaxed limit, and the violation of the relaxed limit.
-    fn beyond(&self, relaxed: Option<usize>) -> (f64, f64) {
-        let own = relaxed.map_or(0.0, |limit| self.violations[limit]);
-        let others = self.violations.iter().enumerate().filter(|&(limit, _)| Some(limit) != relaxed);
-        (others.map(|(_, violation)| violation).sum(), own)
-    }
-
-    /// True if no objective is worse.
-    fn covers(&self, other: &Self) -> bool {
-        self.objectives.iter().zip(&other.objectives).all(|(one, other)| one <= other)
-    }
-
-    /// True if it may replace the other one.
-    fn is_no_worse(&self, other: &Self, relaxed: Option<usize>) -> bool {
-        let (own, others) = (self.beyond(relaxed), other.beyond(relaxed));
-        if own > (0.0, 0.0) || others > (0.0, 0.0) { own <= others } else { !other.covers(self) || self.covers(other) }
-    }
 }
 
 impl Optimiser {
@@ -386,7 +333,8 @@ pub fn merged(fronts: impl IntoIterator<Item = Point>) -> Vec<Point> {
 
 #[cfg(test)]
 mod tests {
-    use super::{CROSSOVER_INDEX, Judged, MUTATION_INDEX, Optimiser, Plan, Point, offset, spread};
+    use super::{CROSSOVER_INDEX, MUTATION_INDEX, Optimiser, Plan, offset, spread};
+    use crate::point::{Judged, Point};
 
     /// Density of the spread by Deb and Agrawal: `(η + 1) β^η / 2` below 1, and `(η + 1) / (2 β^(η + 2))` above.
     #[test]

@@ -64,6 +64,13 @@ def cluster(tmp_path):
 
 
 @pytest.fixture
+def folder(tmp_path):
+    folder = tmp_path / "parts"
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture
 def study(tolerance):
     """Four variants to a chunk."""
     return toothwave.Study(tolerance | {"samples": 4 * CHUNKS - 1}, chunk_variants=4)
@@ -93,17 +100,13 @@ def assert_same(result, whole):
     assert (result.rows["peak_stress_ring_mpa"] == whole.rows["peak_stress_ring_mpa"]).all()
 
 
-def test_worker_killed(cluster, study, whole, tmp_path):
-    folder = tmp_path / "parts"
-    folder.mkdir()
+def test_worker_killed(cluster, study, whole, folder):
     with cluster.executor() as executor, running(study, executor, folder, 300) as run:
         cluster.signal(cluster.workers[0], signal.SIGKILL)
         assert_same(run.result(timeout=120), whole)
 
 
-def test_worker_stopped_for_12_s(cluster, study, whole, tmp_path):
-    folder = tmp_path / "parts"
-    folder.mkdir()
+def test_worker_stopped_for_12_s(cluster, study, whole, folder):
     with cluster.executor() as executor, running(study, executor, folder, 300) as run:
         cluster.signal(cluster.workers[0], signal.SIGSTOP)
         time.sleep(12)
@@ -111,9 +114,7 @@ def test_worker_stopped_for_12_s(cluster, study, whole, tmp_path):
         assert_same(run.result(timeout=120), whole)
 
 
-def test_scheduler_killed(cluster, study, whole, tmp_path):
-    folder = tmp_path / "parts"
-    folder.mkdir()
+def test_scheduler_killed(cluster, study, whole, folder, tmp_path):
     with cluster.executor() as executor, running(study, executor, folder, 300) as run:
         cluster.signal(cluster.scheduler, signal.SIGKILL)
         with pytest.raises(concurrent.futures.BrokenExecutor):
@@ -136,15 +137,13 @@ def compute_or_die(function, *arguments):
     return function(*arguments)
 
 
-def test_chunk_that_kills_its_process_is_a_gap(cluster, study, whole, tmp_path):
-    folder = tmp_path / "parts"
+def test_chunk_that_kills_its_process_is_a_gap(cluster, study, whole, folder):
     with cluster.executor() as executor:
         submit, submitted = executor.submit, []
-        executor.submit = lambda *arguments: submitted.append(time.monotonic()) or submit(compute_or_die, *arguments)
-        started = time.monotonic()
+        executor.submit = lambda *arguments: submitted.append(arguments[-1]) or submit(compute_or_die, *arguments)
         result = study.run(executor, checkpoint=folder, progress=False)
-        elapsed_s = time.monotonic() - started
-    assert elapsed_s < 60
+    # Dask itself tries it on several workers. Then it runs alone.
+    assert submitted.count(KILLER) == 2
     variants = range(4 * KILLER, 4 * KILLER + 4)
     assert [(gap.chunk, gap.variants) for gap in result.gaps] == [(KILLER, variants)]
     rows = {variant: stress for variant, stress in zip(whole.rows["variant"], whole.rows["peak_stress_ring_mpa"])}

@@ -6,6 +6,7 @@
 mod part_bytes;
 mod record;
 mod runner;
+mod state;
 mod store;
 
 use std::sync::Arc;
@@ -19,8 +20,9 @@ use tokio_util::task::TaskTracker;
 use toothwave_study::{Study, StudyAnswer};
 use tracing::Instrument as _;
 
-pub use self::record::{StudyRecord, StudyResource, StudyState};
+pub use self::record::{StudyRecord, StudyResource};
 use self::runner::Run;
+pub use self::state::StudyState;
 pub use self::store::{Store, StoreError};
 use self::store::{StoredStudy, now_s};
 use crate::compute::pool::Pool;

@@ -8,22 +8,9 @@ use tokio_util::sync::CancellationToken;
 use toothwave_study::{Study, StudyAnswer};
 use utoipa::ToSchema;
 
+use super::state::{Progress, StudyState};
 use super::store::StoredStudy;
 use crate::http::problem::Problem;
-
-/// State of a study.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum StudyState {
-    /// Variants are being computed.
-    Running,
-    /// All variants are computed.
-    Done,
-    /// A client cancelled the study. The same study document continues it.
-    Cancelled,
-    /// The study failed. The same study document continues it.
-    Failed,
-}
 
 /// Record of one study.
 #[derive(Debug)]
@@ -45,13 +32,6 @@ struct Status {
     problem: Option<Problem>,
     /// Progress of the stored parts.
     progress: Progress,
-}
-
-/// Computed variants, and those of them without an answer.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Progress {
-    pub(super) variants: u64,
-    pub(super) impossible: u64,
 }
 
 /// Current state of a study.

@@ -12,8 +12,9 @@ use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_study::{Gathered, Study, StudyAnswer, Work};
 
 use super::part_bytes;
-use super::record::{Progress, StudyRecord, StudyState};
-use super::store::{self, NewPart, Store};
+use super::record::StudyRecord;
+use super::state::{Progress, StudyState};
+use super::store::{self, NewPart, Store, damaged};
 use crate::compute::pool::Pool;
 use crate::http::problem::{Problem, ProblemCode};
 
@@ -118,11 +119,4 @@ pub(super) fn answer(store: &Store, record: &StudyRecord, stop: &AtomicBool) -> 
 fn removed(id: &str) -> Problem {
     let detail = format!("the study `{id}` was removed during this request. Request it again");
     Problem::new(ProblemCode::NotFound, detail)
-}
-
-/// Returns the problem of a study with damaged stored content.
-pub(super) fn damaged(id: &str, what: &str) -> Problem {
-    let detail = "the stored study is damaged. Delete it and request it again";
-    let cause = format!("the study {id} is damaged in its file: {what}");
-    Problem { cause: Some(cause), ..Problem::new(ProblemCode::InternalError, detail) }
 }

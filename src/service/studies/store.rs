@@ -17,8 +17,7 @@ use toothwave_calculation::json::word;
 use toothwave_calculation::{origin, question};
 use toothwave_study::Study;
 
-use super::record::{Progress, StudyState};
-use super::runner::damaged;
+use super::state::{Progress, StudyState};
 use crate::http::problem::{Problem, ProblemCode};
 use crate::ops::config::Limits;
 
@@ -354,4 +353,11 @@ pub(super) fn parts(transaction: &Transaction<'_>, id: &str, from_chunk: u64) ->
     let text = "SELECT chunk, part FROM parts WHERE study = ?1 AND chunk >= ?2 ORDER BY chunk LIMIT ?3";
     let mut statement = transaction.prepare(text)?;
     statement.query_map(params![id, from_chunk, AT_ONCE], |row| Ok((row.get(0)?, row.get(1)?)))?.collect()
+}
+
+/// Returns the problem of a study with damaged stored content.
+pub(super) fn damaged(id: &str, what: &str) -> Problem {
+    let detail = "the stored study is damaged. Delete it and request it again";
+    let cause = format!("the study {id} is damaged in its file: {what}");
+    Problem { cause: Some(cause), ..Problem::new(ProblemCode::InternalError, detail) }
 }
