@@ -81,7 +81,9 @@ pub(crate) fn ask(py: Python<'_>, question: &str, document: &[u8]) -> PyResult<A
     });
     match answer {
         Some(answer) => answer.map_err(|no_answer| raised(py, no_answer)),
-        None => Err(PyValueError::new_err(format!("unknown part `{question}`. Use ring, wave_generator, carrier, tooth or assembly"))),
+        None => Err(PyValueError::new_err(format!(
+            "unknown part `{question}`. Use ring, wave_generator, carrier, tooth or assembly"
+        ))),
     }
 }
 
@@ -126,6 +128,10 @@ pub(crate) fn format_of(word: &str) -> PyResult<Format> {
         "svg" => Format::Svg,
         "dxf" => Format::Dxf,
         "step" => Format::Step,
-        _ => return Err(PyValueError::new_err(format!("unknown format `{word}`. Use json, csv, arrow, parquet, text, svg, dxf or step"))),
+        _ => {
+            return Err(PyValueError::new_err(format!(
+                "unknown format `{word}`. Use json, csv, arrow, parquet, text, svg, dxf or step"
+            )));
+        }
     })
 }

@@ -94,7 +94,9 @@ impl Gathered {
             (None, _) => Ok(()),
             (Some(table), Format::Csv) => table.write_csv(writer),
             (Some(table), Format::Parquet) => table.write_parquet(writer),
-            (Some(_), _) => Err(io::Error::new(io::ErrorKind::Unsupported, "rows have no such format. Use CSV or Parquet")),
+            (Some(_), _) => {
+                Err(io::Error::new(io::ErrorKind::Unsupported, "rows have no such format. Use CSV or Parquet"))
+            }
         }
     }
 
