@@ -1,6 +1,6 @@
 //! The native part of the Python package `toothwave`: reads documents, returns Python objects and NumPy columns.
 //!
-//! Computations release Python's global lock. The package's Python code adds the interfaces of data frames and executors.
+//! Computations release Python's global lock. The package's Python code adds data frames and executors.
 
 mod answer;
 mod column;

@@ -1,7 +1,7 @@
 //! Parts as Apache Parquet files: the rows of a chunk, or the designs found by an island of a search.
 //!
-//! The file's metadata names the study, the chunk, the build and the arithmetic. Parts of different builds or arithmetic
-//! are never merged, because their last bits differ.
+//! The file's metadata names the study, the chunk, the build and the arithmetic. Parts of different builds or
+//! arithmetic are never merged, because their last bits differ.
 
 use std::collections::BTreeMap;
 use std::io;

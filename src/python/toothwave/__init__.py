@@ -1,6 +1,6 @@
 """Forces and contact stresses of discrete-tooth harmonic drives, and studies of their variants.
 
-A design has the form of the service's design document: a dict, JSON text, or the path of a JSON file. Answers are mappings with the names
+A design has the form of the service's design document: a dict, JSON text, or a `pathlib.Path` of a JSON file. Answers are mappings with the names
 of the service's JSON. Their columns are NumPy arrays. An invalid document raises `Problem`.
 """
 

@@ -188,7 +188,7 @@ class _Pending:
 
 
 def require_connected(executor: Executor) -> None:
-    """Raises `BrokenExecutor` if a Dask client has lost its scheduler: some of its futures would never end."""
+    """Raises `BrokenExecutor` if a Dask client has lost its scheduler, because some of its futures would never end."""
     status = getattr(getattr(executor, "_client", None), "status", "running")
     if status != "running":
         raise BrokenExecutor(f"the Dask client lost its scheduler (status {status}). Connect again and run the study with the same checkpoint")

@@ -54,9 +54,7 @@ impl FromStr for PartOf {
             text.split_once('/').and_then(|(number, parts)| Some((number.parse().ok()?, parts.parse().ok()?)));
         match numbers {
             Some((number, parts)) if parts > 0 && number <= parts => Ok(Self { number, parts }),
-            _ => Err(
-                "expected N/PARTS, for instance 17/200: the number of the part, from 0 or from 1, and the number of parts",
-            ),
+            _ => Err("expected N/PARTS, for instance 17/200: the part's number, from 0 or 1, and the number of parts"),
         }
     }
 }
