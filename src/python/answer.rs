@@ -22,16 +22,16 @@ use toothwave_calculation::sweep::{self, Sweep};
 use crate::column::Column;
 use crate::{raised, to_python};
 
-/// An answer. Its Python objects are made when they are asked for.
+/// An answer. Its Python objects are made on request.
 #[pyclass(frozen, module = "toothwave._native")]
 pub struct Answer(Arc<dyn Told>);
 
-/// What every answer can be asked.
+/// Operations of every answer.
 trait Told: Send + Sync {
-    /// The answer as Python objects, a sweep without its states.
+    /// Returns the answer as Python objects, a sweep without its states.
     fn object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>>;
 
-    /// The answer in a form.
+    /// Writes the answer in a format.
     fn write(&self, format: Format) -> io::Result<Vec<u8>>;
 
     fn any(self: Arc<Self>) -> Arc<dyn Any + Send + Sync>;
@@ -59,7 +59,7 @@ impl Answer {
     }
 }
 
-/// Asks a design document.
+/// Computes the answer to a design document.
 #[pyfunction]
 pub(crate) fn ask(py: Python<'_>, question: &str, document: &[u8]) -> PyResult<Answer> {
     fn asked<Q: Question<Answer: Send + Sync>>(question: Q, document: &[u8]) -> Result<Answer, NoAnswer> {
@@ -81,25 +81,27 @@ pub(crate) fn ask(py: Python<'_>, question: &str, document: &[u8]) -> PyResult<A
     });
     match answer {
         Some(answer) => answer.map_err(|no_answer| raised(py, no_answer)),
-        None => Err(PyValueError::new_err(format!("there is no part `{question}` to draw"))),
+        None => Err(PyValueError::new_err(format!(
+            "unknown part `{question}`. Use ring, wave_generator, carrier, tooth or assembly"
+        ))),
     }
 }
 
 #[pymethods]
 impl Answer {
-    /// The answer as Python objects, its columns as NumPy arrays; a sweep without its states.
+    /// Returns the answer as Python objects, its columns as NumPy arrays; a sweep without its states.
     fn object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.0.object(py)
     }
 
-    /// The bytes of the answer in a form: json, csv, arrow, parquet, text, svg, dxf or step.
+    /// Returns the bytes of the answer in a format: json, csv, arrow, parquet, text, svg, dxf or step.
     fn text<'py>(&self, py: Python<'py>, format: &str) -> PyResult<Bound<'py, PyBytes>> {
         let format = format_of(format)?;
         let text = py.detach(|| self.0.write(format))?;
         Ok(PyBytes::new(py, &text))
     }
 
-    /// The columns of a sweep's states, in the order of the CSV; of other answers none.
+    /// Returns the columns of a sweep's states in the order of the CSV; none for other answers.
     fn states<'py>(&self, py: Python<'py>) -> PyResult<Vec<(&'static str, Bound<'py, PyAny>)>> {
         let owner = Arc::clone(&self.0).any();
         let Ok(sweep) = Arc::clone(&owner).downcast::<SweepAnswer>() else { return Ok(Vec::new()) };
@@ -126,6 +128,10 @@ pub(crate) fn format_of(word: &str) -> PyResult<Format> {
         "svg" => Format::Svg,
         "dxf" => Format::Dxf,
         "step" => Format::Step,
-        _ => return Err(PyValueError::new_err(format!("there is no form `{word}`"))),
+        _ => {
+            return Err(PyValueError::new_err(format!(
+                "unknown format `{word}`. Use json, csv, arrow, parquet, text, svg, dxf or step"
+            )));
+        }
     })
 }

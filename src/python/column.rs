@@ -1,4 +1,4 @@
-//! Columns of numbers as NumPy reads them: without a copy, and without text.
+//! Columns of numbers for NumPy, shared without a copy.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -6,20 +6,21 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// A column of numbers. NumPy takes it by `__array_interface__`: the array refers to the memory of this object, and keeps it.
+/// A column of numbers, which NumPy reads through `__array_interface__`. The array refers to this object's memory and
+/// keeps the object alive.
 #[pyclass(frozen, module = "toothwave._native")]
 #[derive(Debug)]
 pub struct Column {
-    /// Holds the numbers, which nothing changes.
+    /// Owner of the numbers, which are never changed.
     _owner: Arc<dyn Any + Send + Sync>,
     address: usize,
     length: usize,
     type_word: &'static str,
 }
 
-/// Numbers that NumPy has a type for.
+/// Number type that NumPy supports.
 pub(crate) trait Element: Send + Sync + 'static {
-    /// The type, as NumPy spells it.
+    /// The type in NumPy's notation.
     const TYPE_WORD: &'static str;
 }
 
@@ -44,20 +45,20 @@ impl Element for bool {
 }
 
 impl Column {
-    /// Numbers that lie within what `owner` holds.
+    /// Makes a column of numbers that `owner` holds.
     pub(crate) fn within<E: Element>(owner: Arc<dyn Any + Send + Sync>, numbers: &[E]) -> Self {
         let address = numbers.as_ptr().expose_provenance();
         Self { _owner: owner, address, length: numbers.len(), type_word: E::TYPE_WORD }
     }
 
-    /// Numbers of its own.
+    /// Makes a column that owns its numbers.
     pub(crate) fn of<E: Element>(numbers: Vec<E>) -> Self {
         let owner = Arc::new(numbers);
         let (address, length) = (owner.as_ptr().expose_provenance(), owner.len());
         Self { _owner: owner, address, length, type_word: E::TYPE_WORD }
     }
 
-    /// The NumPy array of this column.
+    /// Returns the column as a NumPy array.
     pub(crate) fn array(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
         py.import("numpy")?.call_method1("asarray", (self,))
     }
@@ -65,7 +66,7 @@ impl Column {
 
 #[pymethods]
 impl Column {
-    /// What NumPy reads (version 3 of its array interface): the address, which is read only, the length and the type.
+    /// NumPy's array interface, version 3: the address of read-only memory, the length and the type.
     #[getter]
     fn __array_interface__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let interface = PyDict::new(py);

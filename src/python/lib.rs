@@ -1,6 +1,6 @@
-//! The native part of the Python package `toothwave`: documents in, Python objects and NumPy columns out.
+//! The native part of the Python package `toothwave`: reads documents, returns Python objects and NumPy columns.
 //!
-//! Python's lock is released wherever something is computed. The package's own Python code adds the interfaces of data frames and executors.
+//! Computations release Python's global lock. The package's Python code adds data frames and executors.
 
 mod answer;
 mod column;
@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use toothwave_calculation::json;
 use toothwave_calculation::no_answer::NoAnswer;
 
-/// As in the service: a sweep's columns are taken from memory that is there already.
+/// The allocator of the service, which reuses freed memory for a sweep's columns.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -21,13 +21,13 @@ create_exception!(
     toothwave,
     Problem,
     PyValueError,
-    "Why a document has no answer: `code`, `detail`, and `errors`, each with the JSON `pointer` of a field."
+    "Reason why a document has no answer: `code`, `detail`, and `errors`, each with the JSON `pointer` of a field."
 );
 create_exception!(
     toothwave,
     PartError,
     PyValueError,
-    "A part of a study that is damaged, or that another build or study made."
+    "A part of a study is damaged, or belongs to another build or another study."
 );
 
 #[pymodule]
@@ -46,7 +46,7 @@ mod _native {
     const __version__: &str = env!("CARGO_PKG_VERSION");
 }
 
-/// A reason as a Python exception.
+/// Returns the reason as a Python exception.
 fn raised(py: Python<'_>, no_answer: NoAnswer) -> PyErr {
     let error = Problem::new_err(no_answer.to_string());
     let NoAnswer { code, detail, errors } = no_answer;

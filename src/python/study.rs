@@ -1,4 +1,4 @@
-//! Studies: their chunks, their parts, and what these come to.
+//! Studies: their chunks, parts and results.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,10 +13,10 @@ use crate::answer::{Answer, format_of};
 use crate::column::Column;
 use crate::{PartError, raised};
 
-/// The columns of a table, each with its name.
+/// Named columns of a table.
 type Columns<'py> = Vec<(String, Bound<'py, PyAny>)>;
 
-/// A study that was read and checked.
+/// A checked study.
 #[pyclass(frozen, module = "toothwave._native")]
 pub struct Study(Arc<engine::Study>);
 
@@ -52,13 +52,13 @@ impl Study {
         self.0.chunks()
     }
 
-    /// The first variant of a chunk and the one after its last; nothing of a search, whose chunks are islands.
+    /// Returns a chunk's first variant and the one after its last; `None` for a search, whose chunks are islands.
     fn span(&self, chunk: u64) -> Option<(u64, u64)> {
         let span = self.0.span_of(chunk);
         self.0.has_rows().then_some((span.start, span.end))
     }
 
-    /// Computes a chunk. The part is a Parquet file.
+    /// Computes a chunk and returns its part, the bytes of a Parquet file.
     fn compute<'py>(&self, py: Python<'py>, chunk: u64) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = py.detach(|| {
             let part = Work::new(&self.0, chunk).run(&Never).map_err(|_| std::io::ErrorKind::Interrupted)?;
@@ -68,7 +68,7 @@ impl Study {
     }
 }
 
-/// The parts of a study that have come.
+/// The parts of a study computed so far.
 #[pyclass(frozen, module = "toothwave._native")]
 pub struct Gathered {
     study: Arc<engine::Study>,
@@ -82,7 +82,7 @@ impl Gathered {
         Self { study: Arc::clone(&study.0), gathered: Mutex::new(engine::Gathered::new(&study.0)) }
     }
 
-    /// Takes a part.
+    /// Adds a part.
     fn add(&self, py: Python<'_>, chunk: u64, bytes: Vec<u8>) -> PyResult<()> {
         py.detach(|| {
             let part = self.study.read_part(chunk, bytes).map_err(|error| PartError::new_err(error.to_string()))?;
@@ -91,13 +91,13 @@ impl Gathered {
         })
     }
 
-    /// Variants that were computed.
+    /// Number of computed variants.
     #[getter]
     fn variants(&self) -> u64 {
         self.gathered.lock().variants()
     }
 
-    /// The chunks without a part.
+    /// Returns the chunks without a part.
     fn missing(&self) -> Vec<u64> {
         self.gathered.lock().missing().collect()
     }
@@ -106,17 +106,17 @@ impl Gathered {
         py.detach(|| Answer::new(self.gathered.lock().answer()))
     }
 
-    /// The columns of the answer's table.
+    /// Returns the columns of the result's table.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Columns<'py>> {
         arrays(py, py.detach(|| self.gathered.lock().answer().columns()))
     }
 
-    /// The columns of the rows, one a variant; nothing of a search.
+    /// Returns the columns of the rows, one for each variant; `None` for a search.
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Option<Columns<'py>>> {
         py.detach(|| self.gathered.lock().rows_columns()).map(|columns| arrays(py, columns)).transpose()
     }
 
-    /// The rows as csv or parquet.
+    /// Returns the rows as csv or parquet.
     fn rows_text<'py>(&self, py: Python<'py>, format: &str) -> PyResult<Bound<'py, PyBytes>> {
         let format = format_of(format)?;
         let text = py.detach(|| {
@@ -136,7 +136,7 @@ fn arrays(py: Python<'_>, columns: Vec<TableColumn>) -> PyResult<Vec<(String, Bo
     columns.into_iter().map(|TableColumn { name, values }| Ok((name, array(values)?))).collect()
 }
 
-/// A folder with a file for each part.
+/// A folder with one file for each part.
 #[pyclass(frozen, module = "toothwave._native")]
 pub struct Folder(PartFolder);
 
@@ -147,7 +147,7 @@ impl Folder {
         Ok(Self(PartFolder::create(&path)?))
     }
 
-    /// The chunks that have a part here.
+    /// Returns the chunks that have a part in the folder.
     fn chunks(&self) -> PyResult<Vec<u64>> {
         Ok(self.0.chunks()?.into_iter().collect())
     }

@@ -1,5 +1,5 @@
-//! Answers as Python objects: what is an object, a word or a list in JSON is a `dict`, a `str` or a `list`, but a column of numbers is a
-//! NumPy array.
+//! Conversion of answers to Python objects. A JSON object becomes a `dict`, a string a `str`, a list a `list`.
+//! A list of numbers becomes a NumPy array.
 
 use std::fmt::Display;
 
@@ -11,7 +11,7 @@ use serde::ser::{self, Impossible, SerializeMap, SerializeSeq, SerializeStruct, 
 
 use crate::column::Column;
 
-/// A value as a Python object, without the field `skipped` of the outermost object.
+/// Returns a value as a Python object, without the field `skipped` of the outermost object.
 pub(crate) fn object<'py>(
     py: Python<'py>,
     value: &impl Serialize,
@@ -26,7 +26,7 @@ struct ToPython<'py> {
     skipped: Option<&'static str>,
 }
 
-/// A value: numbers stay numbers until it is known whether they are of a column.
+/// A converted value. Numbers become Python objects only if they are not part of a column.
 enum Made<'py> {
     Number(f64),
     Count(i64),
@@ -45,7 +45,7 @@ impl<'py> Made<'py> {
     }
 }
 
-/// What Python raised.
+/// An exception raised by Python.
 #[derive(Debug)]
 struct Failed(PyErr);
 
@@ -78,7 +78,7 @@ impl From<Failed> for PyErr {
 type Result<T, E = Failed> = std::result::Result<T, E>;
 
 fn in_no_answer<T>(what: &str) -> Result<T> {
-    Err(ser::Error::custom(format_args!("no answer has {what}")))
+    Err(ser::Error::custom(format_args!("cannot convert {what} to Python")))
 }
 
 impl<'py> Serializer for ToPython<'py> {
@@ -221,11 +221,11 @@ impl<'py> Serializer for ToPython<'py> {
         _: &'static str,
         _: usize,
     ) -> Result<Self::SerializeStructVariant> {
-        in_no_answer("objects within a name")
+        in_no_answer("enum variants with fields")
     }
 }
 
-/// A list as it grows.
+/// A list under construction.
 struct Items<'py> {
     py: Python<'py>,
     length: usize,
@@ -256,7 +256,7 @@ impl<'py> Items<'py> {
             (List::Empty, Made::Count(count)) => self.list = List::Counts(first(self.length, count)),
             (List::Empty, Made::Flag(flag)) => self.list = List::Flags(first(self.length, flag)),
             (List::Empty, Made::Object(object)) => self.list = List::Objects(first(self.length, object)),
-            _ => return in_no_answer("numbers beside other values in a list"),
+            _ => return in_no_answer("a list that mixes numbers and other values"),
         }
         Ok(())
     }
@@ -301,11 +301,11 @@ impl<'py> SerializeTuple for Items<'py> {
     }
 }
 
-/// A `dict` as it grows.
+/// A `dict` under construction.
 struct Fields<'py> {
     py: Python<'py>,
     dict: Bound<'py, PyDict>,
-    /// Of the value that comes next.
+    /// Name of the next value.
     name: Option<Bound<'py, PyAny>>,
     skipped: Option<&'static str>,
 }
@@ -323,7 +323,7 @@ impl<'py> SerializeMap for Fields<'py> {
         let value = value.serialize(ToPython { py: self.py, skipped: None })?.object(self.py)?;
         match self.name.take() {
             Some(name) => Ok(self.dict.set_item(name, value)?),
-            None => in_no_answer("values without a name"),
+            None => in_no_answer("a value without a name"),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Parts of a study, merged to the same bits in whatever order they come.
+//! Collected parts of a study, merged to the same bits in any order of arrival.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -94,7 +94,9 @@ impl Gathered {
             (None, _) => Ok(()),
             (Some(table), Format::Csv) => table.write_csv(writer),
             (Some(table), Format::Parquet) => table.write_parquet(writer),
-            (Some(_), _) => Err(io::Error::new(io::ErrorKind::Unsupported, "rows are a table: CSV or Parquet")),
+            (Some(_), _) => {
+                Err(io::Error::new(io::ErrorKind::Unsupported, "rows have no such format. Use CSV or Parquet"))
+            }
         }
     }
 

@@ -1,7 +1,7 @@
-//! A part as an Apache Parquet file: the rows of a chunk, or the designs that an island of a search found.
+//! Parts as Apache Parquet files: the rows of a chunk, or the designs found by an island of a search.
 //!
-//! The file's metadata says which chunk of which study it holds, and which build and arithmetic computed it: parts with other last bits are
-//! never merged.
+//! The file's metadata names the study, the chunk, the build and the arithmetic. Parts of different builds or
+//! arithmetic are never merged, because their last bits differ.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -19,19 +19,19 @@ use crate::study::{Part, Study};
 const STUDY: &str = "toothwave.study";
 const CHUNK: &str = "toothwave.chunk";
 const CHUNK_VARIANTS: &str = "toothwave.chunk_variants";
-/// The build and the arithmetic.
+/// Key of the build and the arithmetic.
 const ORIGIN: &str = "toothwave.origin";
-/// The part without its columns, as JSON.
+/// Key of the part without its columns, as JSON.
 const PART: &str = "toothwave.part";
 
-/// Why the bytes of a part are refused.
+/// Reason to refuse the bytes of a part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PartError {
-    /// They are no part, or not as they were written.
+    /// The bytes are no part, or were changed after they were written.
     Damaged(String),
-    /// Another build computed them, or a processor with another arithmetic.
+    /// Another build computed the part, or a processor with another arithmetic.
     OtherOrigin(String),
-    /// They belong to another study, to another chunk, or to chunks of another size.
+    /// The part belongs to another study, to another chunk, or to chunks of another size.
     OtherStudy,
 }
 
@@ -58,10 +58,10 @@ impl From<ParquetError> for PartError {
 }
 
 impl Study {
-    /// A part of this study as the bytes of a Parquet file.
+    /// Returns a part of this study as the bytes of a Parquet file.
     ///
     /// # Errors
-    /// If Parquet refuses the table.
+    /// If the Parquet library refuses the table.
     pub fn part_bytes(&self, chunk: u64, part: &Part) -> io::Result<Vec<u8>> {
         let mut notes: Vec<_> = self.notes(chunk).map(|(name, value)| KeyValue::new(name.into(), value)).into();
         let without_columns = match part {
@@ -85,10 +85,10 @@ impl Study {
         Ok(bytes)
     }
 
-    /// The part of a chunk from the bytes of its file.
+    /// Reads the part of a chunk from the bytes of its file.
     ///
     /// # Errors
-    /// If the bytes are anything else, or another build computed them.
+    /// If the bytes are damaged, or belong to another build, another study or another chunk.
     pub fn read_part(&self, chunk: u64, bytes: Vec<u8>) -> Result<Part, PartError> {
         let file = SerializedFileReader::new(Bytes::from(bytes))?;
         let notes = file.metadata().file_metadata().key_value_metadata().into_iter().flatten();
@@ -124,7 +124,7 @@ impl Study {
         }
     }
 
-    /// What tells a part from every other one. The origin comes first, because the id of a study follows from it too.
+    /// Returns the metadata that identifies a part. The origin comes first, because the study's id depends on it.
     fn notes(&self, chunk: u64) -> [(&'static str, String); 4] {
         [
             (ORIGIN, origin().to_owned()),
@@ -153,7 +153,7 @@ fn read_rows(group: &dyn RowGroupReader, quantities: usize, rows: &mut RowsPart)
     Ok(())
 }
 
-/// The values of a column that are there, and of each row whether its value is.
+/// Returns the non-null values of a column, and for each row true if its value is not null.
 fn column<T: DataType>(group: &dyn RowGroupReader, index: usize) -> Result<(Vec<T::T>, Vec<bool>), PartError> {
     let rows = usize::try_from(group.metadata().num_rows()).unwrap_or_default();
     let (mut values, mut levels) = (Vec::with_capacity(rows), Vec::with_capacity(rows));

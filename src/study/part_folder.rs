@@ -1,4 +1,4 @@
-//! A folder with a file for each part: a checkpoint of one process, or what many jobs of a cluster computed.
+//! A folder with one file for each part: the checkpoint of a process, or the output of the jobs of a cluster.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
@@ -6,7 +6,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process;
 
-/// Ends the names of parts.
+/// Suffix of the names of part files.
 const SUFFIX: &str = ".parquet";
 
 /// A folder of the parts of one study.
@@ -16,28 +16,28 @@ pub struct PartFolder {
 }
 
 impl PartFolder {
-    /// The folder at this path, which is made if it is not there.
+    /// Opens the folder at this path, and creates it if it does not exist.
     ///
     /// # Errors
-    /// Those of the file system.
+    /// Returns the file system's errors.
     pub fn create(path: &Path) -> io::Result<Self> {
         fs::create_dir_all(path)?;
         Self::open(path)
     }
 
-    /// The folder at this path.
+    /// Opens the folder at this path.
     ///
     /// # Errors
-    /// If it is no folder.
+    /// If the path is not a readable folder.
     pub fn open(path: &Path) -> io::Result<Self> {
         fs::read_dir(path)?;
         Ok(Self { path: path.to_owned() })
     }
 
-    /// The chunks that have a part here.
+    /// Returns the chunks that have a part in the folder.
     ///
     /// # Errors
-    /// Those of the file system.
+    /// Returns the file system's errors.
     pub fn chunks(&self) -> io::Result<BTreeSet<u64>> {
         let mut chunks = BTreeSet::new();
         for entry in fs::read_dir(&self.path)? {
@@ -47,23 +47,24 @@ impl PartFolder {
         Ok(chunks)
     }
 
-    /// The file of a chunk. Names sort by chunks, so that tools which read the whole folder find the rows in their order.
+    /// Returns the path of a chunk's file. Sorted names are in the order of chunks, so that tools which read the whole
+    /// folder get the rows in order.
     pub fn file(&self, chunk: u64) -> PathBuf {
         self.path.join(format!("{chunk:010}{SUFFIX}"))
     }
 
-    /// The bytes of a part.
+    /// Reads the bytes of a part.
     ///
     /// # Errors
-    /// Those of the file system.
+    /// Returns the file system's errors.
     pub fn read(&self, chunk: u64) -> io::Result<Vec<u8>> {
         fs::read(self.file(chunk))
     }
 
-    /// Writes a part so that its file is whole or not there, even if the machine stops meanwhile.
+    /// Writes a part atomically: after a crash its file is complete or absent.
     ///
     /// # Errors
-    /// Those of the file system.
+    /// Returns the file system's errors.
     pub fn write(&self, chunk: u64, bytes: &[u8]) -> io::Result<()> {
         let (mut file, temporary) = self.temporary(chunk)?;
         let written = file
@@ -72,13 +73,14 @@ impl PartFolder {
             .and_then(|()| fs::rename(&temporary, self.file(chunk)))
             .and_then(|()| File::open(&self.path)?.sync_all());
         if written.is_err() {
-            // It may be gone already.
+            // The file may have been renamed already.
             let _ = fs::remove_file(&temporary);
         }
         written
     }
 
-    /// A new file with a name that no reader takes for a part. Jobs on several machines may write the same chunk at once.
+    /// Creates a temporary file, whose name is not that of a part. Jobs on several machines may write the same chunk at
+    /// once.
     fn temporary(&self, chunk: u64) -> io::Result<(File, PathBuf)> {
         let mut attempt = 0_u64;
         loop {

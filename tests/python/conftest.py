@@ -1,4 +1,4 @@
-"""What the tests of the Python package share."""
+"""Fixtures and helpers of the Python package's tests."""
 
 import json
 import os
@@ -12,7 +12,7 @@ BINARY = os.environ.get("TOOTHWAVE_BIN", str(ROOT / "target/debug/toothwave"))
 
 
 def command_line(*arguments, document=None):
-    """What the command prints, given a document on standard input."""
+    """Returns the standard output of the command. `document` is its standard input."""
     text = None if document is None else json.dumps(document).encode()
     return subprocess.run([BINARY, *map(str, arguments)], input=text, stdout=subprocess.PIPE, check=True).stdout
 
@@ -39,7 +39,7 @@ def tolerance(paper):
 
 @pytest.fixture
 def map_study(paper):
-    """A map of 66 variants, of which some are no drives."""
+    """A map of 66 variants, some of which cannot be built."""
     return {
         "study": "map",
         "base": paper | {"sweep": {"samples": 16}},

@@ -1,4 +1,4 @@
-"""Answers in Python are those of the command line, and so of the service."""
+"""Compares answers in Python with those of the command line, which are those of the service."""
 
 import concurrent.futures
 import io
@@ -13,7 +13,7 @@ from conftest import ROOT, command_line
 
 
 def assert_same(found, wanted):
-    """Equal but for arrays in the place of lists."""
+    """Asserts that values are equal. Arrays equal lists with the same items."""
     if isinstance(wanted, dict):
         assert set(found) == set(wanted)
         for name, value in wanted.items():
@@ -30,7 +30,7 @@ def assert_same(found, wanted):
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "examples").glob("*.json")))
-def test_answers_are_those_of_the_command_line(name):
+def test_answers_equal_command_line(name):
     path = ROOT / f"examples/{name}.json"
     for ask, command in [
         (toothwave.sweep, "sweep"),
@@ -43,7 +43,7 @@ def test_answers_are_those_of_the_command_line(name):
         assert_same(answer, json.loads(text))
 
 
-def test_takes_losses_and_balls_as_well(paper):
+def test_sweep_with_friction(paper):
     friction = {"wave_generator": {"kind": "plain", "coefficient": 0.03}, "ring": {"coefficient": 0.05}, "carrier": {"coefficient": 0.05}}
     design = paper | {"friction": friction, "load": paper["load"] | {"input_speed_rpm": 100}}
     answer = toothwave.sweep(json.dumps(design))
@@ -52,7 +52,7 @@ def test_takes_losses_and_balls_as_well(paper):
 
 
 @pytest.mark.parametrize("part", ["ring", "wave_generator", "carrier", "tooth", "assembly"])
-def test_drawings_are_those_of_the_command_line(part):
+def test_drawings_equal_command_line(part):
     path = ROOT / "examples/paper-5.1.json"
     for form in ["dxf", "step", "svg"]:
         text = command_line("draw", part.replace("_", "-"), path, "--format", form).decode()
@@ -66,14 +66,14 @@ def test_columns_share_memory_and_are_read_only(paper):
     columns = toothwave.sweep(paper).columns
     force = columns["force_ring_n"]
     assert not force.flags.owndata and not force.flags.writeable
-    # The array keeps the answer.
+    # The array keeps the answer alive.
     kept = force.copy()
     del columns
     [toothwave.sweep(paper | {"load": {"input_torque_nm": torque}}) for torque in range(1, 50)]
     assert (force == kept).all()
 
 
-def test_frames_hold_the_csv(paper):
+def test_data_frames_equal_csv(paper):
     pandas, polars, pyarrow = (pytest.importorskip(name) for name in ["pandas", "polars", "pyarrow"])
     sweep = toothwave.sweep(paper)
     csv = pandas.read_csv(io.BytesIO(command_line("sweep", "-", "--format", "csv", document=paper)))
@@ -95,13 +95,13 @@ def test_problem_names_the_field(paper):
     assert (raised.value.code, raised.value.errors) == ("malformed_json", [])
 
 
-def test_takes_numbers_of_numpy(paper):
+def test_accepts_numpy_numbers(paper):
     load = {"input_torque_nm": numpy.float64(20.0)}
     samples = {"samples": numpy.int64(50)}
     assert toothwave.sweep(paper | {"load": load, "sweep": samples}).json() == toothwave.sweep(paper).json()
 
 
-def test_other_threads_run_while_it_computes(paper):
+def test_other_threads_run_during_computation(paper):
     design = json.dumps(paper | {"sweep": {"samples": 1_000_000}})
     with concurrent.futures.ThreadPoolExecutor(1) as pool:
         computed = pool.submit(toothwave.sweep, design)

@@ -1,4 +1,4 @@
-"""Faults on a real Dask cluster: a scheduler and two workers, each a process of its own, compute 2000 chunks."""
+"""Faults on a real Dask cluster: a scheduler process and two worker processes compute 2000 chunks."""
 
 import concurrent.futures
 import contextlib
@@ -20,7 +20,7 @@ KILLER = 777
 
 
 class Cluster:
-    """The processes of a cluster on loopback. Each leads a process group, since a worker has a nanny that starts it again."""
+    """Processes of a cluster on loopback. Each leads a process group, because a nanny process restarts a dead worker."""
 
     def __init__(self, folder):
         with socket.socket() as free:
@@ -72,20 +72,20 @@ def folder(tmp_path):
 
 @pytest.fixture
 def study(tolerance):
-    """Four variants to a chunk."""
+    """A study with four variants in each chunk."""
     return toothwave.Study(tolerance | {"samples": 4 * CHUNKS - 1}, chunk_variants=4)
 
 
 @pytest.fixture
 def whole(study):
-    """What one process comes to."""
+    """The result computed in one process."""
     assert study.chunks == CHUNKS
     return study.run(progress=False)
 
 
 @contextlib.contextmanager
 def running(study, executor, folder, parts):
-    """The study as it runs, when so many parts are there."""
+    """Starts the study and yields its future when `folder` has `parts` files."""
     with concurrent.futures.ThreadPoolExecutor(1) as thread:
         run = thread.submit(study.run, executor, checkpoint=folder, progress=False)
         while len(os.listdir(folder)) < parts:
@@ -131,7 +131,7 @@ def test_scheduler_killed(cluster, study, whole, folder, tmp_path):
 
 
 def compute_or_die(function, *arguments):
-    """Kills its process at one chunk."""
+    """Computes a chunk, but kills its own process at chunk `KILLER`."""
     if arguments[-1] == KILLER:
         os.kill(os.getpid(), signal.SIGKILL)
     return function(*arguments)
@@ -149,5 +149,5 @@ def test_chunk_that_kills_its_process_is_a_gap(cluster, study, whole, folder):
     rows = {variant: stress for variant, stress in zip(whole.rows["variant"], whole.rows["peak_stress_ring_mpa"])}
     assert result.rows["variant"].tolist() == [variant for variant in rows if variant not in variants]
     assert result.rows["peak_stress_ring_mpa"].tolist() == [rows[variant] for variant in result.rows["variant"]]
-    # The gap is closed where the chunk can be computed.
+    # A run that can compute the chunk closes the gap.
     assert_same(study.run(checkpoint=folder, progress=False), whole)

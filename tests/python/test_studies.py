@@ -1,4 +1,4 @@
-"""Studies in Python come to the bits of the command line, on any executor and in several goes."""
+"""Compares studies in Python with the command line bit by bit, on several executors and with checkpoints."""
 
 import concurrent.futures
 import json
@@ -15,7 +15,7 @@ from toothwave import _studies
 
 
 class Faulty(concurrent.futures.ThreadPoolExecutor):
-    """Loses a chunk some times, and notes what runs when."""
+    """An executor that loses a chunk `times` times and records the submitted chunks."""
 
     def __init__(self, chunk, times):
         super().__init__(2)
@@ -37,14 +37,14 @@ def kills_its_process(*arguments):
 
 
 class Killer(concurrent.futures.ProcessPoolExecutor):
-    """A chunk kills the process that computes it."""
+    """An executor in which chunk 40 kills its process."""
 
     def submit(self, function, *arguments):
         return super().submit(kills_its_process if arguments[-1] == 40 else function, *arguments)
 
 
 @pytest.mark.parametrize("kind", ["map_study", "tolerance", "search"])
-def test_result_is_that_of_the_command_line(kind, request):
+def test_result_equals_command_line(kind, request):
     document = request.getfixturevalue(kind)
     result = toothwave.Study(document).run(progress=False)
     assert result.json() + b"\n" == command_line("study", "-", document=document)
@@ -58,14 +58,14 @@ def test_result_is_that_of_the_command_line(kind, request):
         assert list(result.rows) == csv[0].split(",") and len(result.rows["variant"]) == len(csv) - 1
 
 
-def test_rows_have_nan_where_there_is_no_drive(map_study):
+def test_rows_of_impossible_drives_are_nan(map_study):
     rows = toothwave.Study(map_study).run(progress=False).rows
     impossible = numpy.array([reason is not None for reason in rows["reason"]])
     assert 0 < impossible.sum() < len(impossible)
     assert (numpy.isnan(rows["peak_stress_ring_mpa"]) == impossible).all()
 
 
-def test_chunks_of_any_size_and_processes_give_the_same_bits(tolerance):
+def test_chunk_size_and_processes_keep_the_bits(tolerance):
     whole = toothwave.Study(tolerance).run(progress=False)
     study = toothwave.Study(tolerance, chunk_variants=7)
     assert (study.chunks, study.variants) == (50, 350)
@@ -76,7 +76,7 @@ def test_chunks_of_any_size_and_processes_give_the_same_bits(tolerance):
 
 
 @pytest.mark.parametrize("kind", ["map_study", "tolerance", "search"])
-def test_second_run_computes_what_is_missing(kind, request, tmp_path):
+def test_second_run_computes_missing_chunks(kind, request, tmp_path):
     study = toothwave.Study(request.getfixturevalue(kind))
     whole = study.run(checkpoint=tmp_path, progress=False)
     parts = sorted(tmp_path.iterdir())
@@ -88,7 +88,7 @@ def test_second_run_computes_what_is_missing(kind, request, tmp_path):
     assert again.json() == whole.json()
 
 
-def test_jobs_of_an_array_and_python_share_a_folder(tolerance, tmp_path):
+def test_array_jobs_and_python_share_folder(tolerance, tmp_path):
     folder, document = tmp_path / "parts", tmp_path / "study.json"
     document.write_text(json.dumps(tolerance))
     for number in [0, 2]:
@@ -126,7 +126,7 @@ def test_lost_chunk_is_computed_again(tolerance, losses):
     with Faulty(40, losses) as executor:
         result = study.run(executor, progress=False)
     assert result.gaps == [] and executor.submitted.count(40) == losses + 1
-    # After three losses it runs alone, after all others.
+    # After three losses the chunk runs alone, after all others.
     assert losses < 3 or executor.submitted[-1] == 40
     assert result.json() == study.run(progress=False).json()
 
@@ -138,11 +138,11 @@ def test_chunk_that_is_always_lost_is_a_gap(tolerance, tmp_path):
     assert executor.submitted.count(40) == 4
     assert result.gaps == [(40, range(280, 287), "OSError: the worker was lost")]
     assert not result["is_complete"] and result["samples"] == 342
-    # All others are there.
+    # The checkpoint has all other chunks.
     assert study.run(checkpoint=tmp_path, progress=False).json() == study.run(progress=False).json()
 
 
-def test_raises_where_the_executor_breaks(tolerance, tmp_path, monkeypatch):
+def test_raises_if_executor_breaks(tolerance, tmp_path, monkeypatch):
     monkeypatch.setattr(_studies, "WINDOW", 1)
     study = toothwave.Study(tolerance, chunk_variants=7)
     with Killer(1, multiprocessing.get_context("spawn")) as executor:
@@ -152,7 +152,7 @@ def test_raises_where_the_executor_breaks(tolerance, tmp_path, monkeypatch):
     assert study.run(checkpoint=tmp_path, progress=False).json() == study.run(progress=False).json()
 
 
-def test_raises_where_everything_is_lost(tolerance):
+def test_raises_if_all_chunks_are_lost(tolerance):
     class Broken(Faulty):
         def submit(self, function, *arguments):
             return concurrent.futures.ThreadPoolExecutor.submit(self, self.lose)

@@ -1,7 +1,7 @@
 """Forces and contact stresses of discrete-tooth harmonic drives, and studies of their variants.
 
-A design is what the service takes: a dict, JSON text, or the path of a JSON file. Answers are dicts like the service's JSON; their columns are
-NumPy arrays. A document without an answer raises `Problem`.
+A design has the form of the service's design document: a dict, JSON text, or a `pathlib.Path` of a JSON file. Answers are mappings with the names
+of the service's JSON. Their columns are NumPy arrays. An invalid document raises `Problem`.
 """
 
 from ._answers import Answer, Sweep, coincidence_degree, drawing, geometry, sweep

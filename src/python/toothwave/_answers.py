@@ -16,7 +16,7 @@ Document = Mapping[str, Any] | str | bytes | os.PathLike[str]
 
 
 class Answer(Mapping[str, Any]):
-    """An answer: a read-only dict like the service's JSON. Its columns of numbers are NumPy arrays."""
+    """An answer: a read-only mapping with the names of the service's JSON. Columns of numbers are NumPy arrays."""
 
     def __init__(self, native: _native.Answer):
         self._native = native
@@ -38,16 +38,16 @@ class Answer(Mapping[str, Any]):
         return f"{type(self).__name__}: {', '.join(self)}"
 
     def json(self) -> bytes:
-        """The bytes that the service answers with."""
+        """Returns the bytes of the service's JSON response."""
         return self._native.text("json")
 
 
 class Sweep(Tabular, Answer):
-    """Forces and contact stresses over one period. As a table it has a row for each state: an input angle and a tooth."""
+    """Forces and contact stresses over one period. Its table has one row for each state: an input angle and a tooth."""
 
     @cached_property
     def columns(self) -> Columns:
-        """The states: an array for each column of the CSV. They share the answer's memory."""
+        """The states: one array for each column of the CSV. The arrays share the answer's memory."""
         return Columns(self._native.states())
 
     @cached_property
@@ -58,7 +58,7 @@ class Sweep(Tabular, Answer):
         return answer
 
     def svg(self) -> str:
-        """Forces and stresses of a tooth on its way through the mesh, as a picture."""
+        """Returns a plot of the forces and stresses of a tooth over one pass through the mesh, as SVG text."""
         return self._native.text("svg").decode()
 
     def _repr_html_(self) -> str:
@@ -76,7 +76,7 @@ class Sweep(Tabular, Answer):
 
 
 def document_bytes(document: Document) -> bytes:
-    """The JSON text of a document."""
+    """Returns the JSON text of a document."""
     if isinstance(document, bytes):
         return document
     if isinstance(document, os.PathLike):
@@ -88,35 +88,35 @@ def document_bytes(document: Document) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """NumPy's numbers and arrays, and answers, as JSON knows them."""
+    """Returns NumPy numbers, NumPy arrays and answers as values that `json` can write."""
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, Mapping):
         return dict(value)
-    raise TypeError(f"{type(value).__name__} is nothing that JSON knows")
+    raise TypeError(f"{type(value).__name__} cannot be written as JSON. Use dict, list, str, numbers, bool, None or NumPy arrays")
 
 
 def sweep(design: Document) -> Sweep:
-    """Forces and contact stresses over one period: the answer of `/v1/sweep`."""
+    """Computes forces and contact stresses over one period: the answer of `/v1/sweep`."""
     return Sweep(_native.ask("sweep", document_bytes(design)))
 
 
 def geometry(design: Document) -> Answer:
-    """Profiles of the mating parts: the answer of `/v1/geometry`."""
+    """Computes the profiles of the mating parts: the answer of `/v1/geometry`."""
     return Answer(_native.ask("geometry", document_bytes(design)))
 
 
 def coincidence_degree(design: Document) -> Answer:
-    """How many teeth share the load: the answer of `/v1/coincidence-degree`."""
+    """Computes the contact ratio: the answer of `/v1/coincidence-degree`."""
     return Answer(_native.ask("coincidence_degree", document_bytes(design)))
 
 
 def drawing(design: Document, part: str = "assembly", format: str = "dxf") -> str | Answer:
-    """A drawing of a part: `ring`, `wave_generator`, `carrier`, `tooth` or `assembly`.
+    """Returns a drawing of a part: `ring`, `wave_generator`, `carrier`, `tooth` or `assembly`.
 
-    The formats are `dxf`, `step` and `svg`, which are texts, and `json`, which is an `Answer`.
+    The formats `dxf`, `step` and `svg` give text. The format `json` gives an `Answer`.
     """
     if format not in ("dxf", "step", "svg", "json"):
-        raise ValueError(f"a drawing has the formats dxf, step, svg and json, not {format!r}")
+        raise ValueError(f"unknown format {format!r}. Drawings have the formats dxf, step, svg and json")
     answer = _native.ask(part.replace("-", "_"), document_bytes(design))
     return Answer(answer) if format == "json" else answer.text(format).decode()

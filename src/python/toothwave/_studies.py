@@ -1,4 +1,4 @@
-"""Studies on threads of this process, or on whatever has the interface of `concurrent.futures.Executor`."""
+"""Studies on threads of this process, or on any executor with the interface of `concurrent.futures.Executor`."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from ._answers import Answer, Document, document_bytes
 from ._tables import Columns, Tabular
 
 WINDOW = 1000
-"""Chunks that are with the executor at once. A cluster with more cores needs more."""
+"""Largest number of chunks submitted to the executor at once. A cluster with more cores needs a larger one."""
 
 LOSSES = 3
-"""A chunk that was lost so often is computed once more, alone."""
+"""Number of losses after which a chunk is computed once more, alone."""
 
 
 class Gap(NamedTuple):
-    """A chunk that has no part, because it was lost every time."""
+    """A chunk without a part: every attempt to compute it failed."""
 
     chunk: int
     variants: range | None
-    """Its variants; of a search, whose chunks are islands, `None`."""
+    """Variants of the chunk. `None` for a search, whose chunks are islands."""
     error: str
-    """How it was lost at last."""
+    """Error of the last attempt."""
 
 
 class StudyResult(Tabular, Answer):
-    """What a study comes to: a read-only dict like the JSON of the service, and a table like its CSV.
+    """Result of a study: a read-only mapping with the names of the service's JSON, and a table like its CSV.
 
-    `gaps` tells what is missing.
+    `gaps` lists the missing chunks.
     """
 
     def __init__(self, gathered: _native.Gathered, gaps: list[Gap]):
@@ -47,23 +47,23 @@ class StudyResult(Tabular, Answer):
 
     @cached_property
     def columns(self) -> Columns:
-        """The columns of the answer's table. A number that is not there is NaN."""
+        """Columns of the result's table. A missing number is NaN."""
         return Columns(self._gathered.columns())
 
     @cached_property
     def rows(self) -> Columns:
-        """A row for each variant. A search has none."""
+        """Columns with one row for each variant. A search has none."""
         columns = self._gathered.rows()
         if columns is None:
-            raise ValueError("a search has no rows: `front` has the designs that it found")
+            raise ValueError("A search has no rows. Use `front`, which lists the designs found.")
         return Columns(columns)
 
 
 class Study:
-    """Many variants of one design: a map, a search, a sensitivity or a tolerance study, as the service takes it.
+    """Many variants of one design: a map, a search, a sensitivity or a tolerance study. The document has the form of the service.
 
-    A study consists of chunks, whose size follows from the number of variants. `chunk_variants` sets another size, which changes no bit of the
-    result; the islands of a search stay as they are.
+    A study consists of chunks. Their size follows from the number of variants. `chunk_variants` sets another size, which does not
+    change the result. It does not apply to a search, whose chunks are islands.
     """
 
     def __init__(self, document: Document, *, chunk_variants: int | None = None):
@@ -71,10 +71,10 @@ class Study:
         self._chunk_variants = chunk_variants
         self._native = _native.Study(self._document, chunk_variants)
 
-    id = property(lambda self: self._native.id, doc="A hash of what is asked, of the build and of the machine's arithmetic.")
+    id = property(lambda self: self._native.id, doc="Hash of the document, the build and the machine's arithmetic.")
     kind = property(lambda self: self._native.kind, doc="`map`, `search`, `sensitivity` or `tolerance`.")
-    variants = property(lambda self: self._native.variants, doc="How many variants it has.")
-    chunks = property(lambda self: self._native.chunks, doc="How many chunks it consists of.")
+    variants = property(lambda self: self._native.variants, doc="Number of variants.")
+    chunks = property(lambda self: self._native.chunks, doc="Number of chunks.")
 
     def __repr__(self) -> str:
         return f"Study: a {self.kind} of {self.variants} variants in {self.chunks} chunks"
@@ -85,18 +85,18 @@ class Study:
         checkpoint: str | os.PathLike[str] | None = None,
         progress: bool = True,
     ) -> StudyResult:
-        """Computes all chunks, and merges them as they come.
+        """Computes all chunks and returns the merged result.
 
         executor: threads on all cores by default. Others are Dask's `client.get_executor()`, `mpi4py.futures.MPIPoolExecutor()` and loky's
-        `get_reusable_executor()`. Its workers need this package, of the same build, and processors with the same arithmetic.
+        `get_reusable_executor()`. Its workers need the same build of this package and processors with the same arithmetic.
 
-        checkpoint: a folder for the parts, one Parquet file for each chunk. What is there already is not computed again.
+        checkpoint: a folder for the parts, one Parquet file for each chunk. Chunks with a part in the folder are not computed again.
 
-        progress: whether a progress bar is shown.
+        progress: True shows a progress bar.
 
-        A chunk that is lost, because its worker died or raised, is submitted again. After three losses it is computed once more, alone. If it is
-        lost again, it is a gap of the result. If the executor itself breaks, or if its workers lack this package, this raises, and the checkpoint
-        stays.
+        If the worker of a chunk dies or raises an exception, the chunk is submitted again. After three losses it is computed once more,
+        alone. If that fails too, the result lists the chunk in `gaps`. If the executor breaks, or its workers lack this package, `run` raises
+        an exception and keeps the checkpoint.
         """
         gathered = _native.Gathered(self._native)
         folder = _native.Folder(checkpoint) if checkpoint is not None else None
@@ -121,11 +121,11 @@ class Study:
                     folder.write(chunk, part)
                 bar.update(gathered.variants - bar.n)
         if gaps and not gathered.variants:
-            raise RuntimeError(f"all chunks were lost, the first with {gaps[0].error}")
+            raise RuntimeError(f"all chunks were lost. First error: {gaps[0].error}")
         return StudyResult(gathered, sorted(gaps))
 
     def _computed(self, executor: Executor, chunks: Iterable[int]) -> Iterator[tuple[int, bytes | BaseException]]:
-        """Each chunk with its part, or with why it was lost at last."""
+        """Yields each chunk with its part, or with the error of its last attempt."""
         waiting, lost_often = list(reversed(list(chunks))), []
         losses: Counter[int] = Counter()
         with _Pending(executor, self._document, self._chunk_variants) as pending:
@@ -140,19 +140,19 @@ class Study:
                 except (BrokenExecutor, ImportError):
                     raise
                 except CancelledError as error:
-                    raise BrokenExecutor("the executor has cancelled a chunk") from error
+                    raise BrokenExecutor("the executor cancelled a chunk") from error
                 except Exception as error:
                     if losses[chunk] == LOSSES:
                         yield chunk, error
                         continue
-                    # Dask itself has tried such a chunk on several workers.
+                    # Dask has already tried this chunk on several workers.
                     is_last = losses[chunk] + 1 == LOSSES or type(error).__name__ == "KilledWorker"
                     losses[chunk] = LOSSES if is_last else losses[chunk] + 1
                     (lost_often if is_last else waiting).append(chunk)
 
 
 class _Pending:
-    """The chunks that are with the executor."""
+    """Chunks submitted to the executor."""
 
     def __init__(self, executor: Executor, document: bytes, chunk_variants: int | None):
         self._executor = executor
@@ -177,7 +177,7 @@ class _Pending:
         future.add_done_callback(self._done.put)
 
     def next(self) -> tuple[int, Future[bytes]]:
-        """The next chunk that is over."""
+        """Waits for a chunk to end and returns it with its future."""
         while True:
             try:
                 future = self._done.get(timeout=1.0)
@@ -188,25 +188,25 @@ class _Pending:
 
 
 def require_connected(executor: Executor) -> None:
-    """Raises if the executor is of a Dask client without its scheduler: its futures are lost then, and some of them never say so."""
+    """Raises `BrokenExecutor` if a Dask client has lost its scheduler, because some of its futures would never end."""
     status = getattr(getattr(executor, "_client", None), "status", "running")
     if status != "running":
-        raise BrokenExecutor(f"the Dask client has lost its scheduler: it is {status}")
+        raise BrokenExecutor(f"the Dask client lost its scheduler (status {status}). Connect again and run the study with the same checkpoint")
 
 
 def _cores() -> int:
-    """The cores that this process may use."""
+    """Returns the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def compute_chunk(document: bytes, chunk_variants: int | None, chunk: int) -> bytes:
-    """A part of a study: what workers compute."""
+    """Computes a chunk on a worker and returns its part."""
     return _study(document, chunk_variants).compute(chunk)
 
 
 @lru_cache(maxsize=8)
 def _study(document: bytes, chunk_variants: int | None) -> _native.Study:
-    """The study of the chunks before, which need not be read and checked again."""
+    """Returns the study, cached so that it is read and checked once for all its chunks."""
     return _native.Study(document, chunk_variants)

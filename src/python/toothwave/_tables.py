@@ -1,4 +1,4 @@
-"""Columns of numbers, and what data frames make of them."""
+"""Columns of numbers and their conversion to data frames."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy
 
 
 class Columns(Mapping[str, numpy.ndarray]):
-    """A table by its columns: a NumPy array for each name, all of one length.
+    """A table: a mapping from names to NumPy arrays of one length.
 
-    pyarrow, polars, DuckDB and others read it by Arrow's PyCapsule interface, which needs pyarrow.
+    pyarrow, polars, DuckDB and others read it through Arrow's PyCapsule interface, which needs pyarrow.
     """
 
     def __init__(self, columns: list[tuple[str, numpy.ndarray]]):
@@ -31,16 +31,16 @@ class Columns(Mapping[str, numpy.ndarray]):
         return f"Columns of {rows} rows: {', '.join(self._columns)}"
 
     def to_pandas(self):
-        """The table as a `pandas.DataFrame`."""
+        """Returns the table as a `pandas.DataFrame`."""
         import pandas
 
         return pandas.DataFrame(self._columns)
 
     def to_polars(self):
-        """The table as a `polars.DataFrame`."""
+        """Returns the table as a `polars.DataFrame`."""
         import polars
 
-        # Words are Python objects to NumPy, and would stay such.
+        # A NumPy array of strings has the type `object`, which polars would keep.
         plain = {name: list(column) if column.dtype == object else column for name, column in self.items()}
         return polars.DataFrame(plain)
 
@@ -51,16 +51,16 @@ class Columns(Mapping[str, numpy.ndarray]):
 
 
 class Tabular:
-    """What has columns is a table itself."""
+    """Base of answers with columns, which can be used as tables."""
 
     columns: Columns
 
     def to_pandas(self):
-        """The columns as a `pandas.DataFrame`."""
+        """Returns the columns as a `pandas.DataFrame`."""
         return self.columns.to_pandas()
 
     def to_polars(self):
-        """The columns as a `polars.DataFrame`."""
+        """Returns the columns as a `polars.DataFrame`."""
         return self.columns.to_polars()
 
     def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:

@@ -1,4 +1,5 @@
-//! `toothwave study`: many variants of one design, computed on all cores of this machine or as jobs of a cluster.
+//! Command `toothwave study`: computes many variants of one design on all cores of this machine, or as jobs of a
+//! cluster.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -16,29 +17,29 @@ use super::Failure;
 use super::offline::{FORMATS, log_errors, one_of, print, print_answer, progress_bar, read, require_form};
 use crate::http::problem::Problem;
 
-/// The arguments of the command.
+/// Arguments of the command.
 #[derive(Debug, Args)]
 pub(super) struct StudyCommand {
     /// A study document, or `-` for standard input
     file: PathBuf,
-    /// Form of the answer, `json` if not given; of rows `csv` or `parquet`
+    /// Format of the result, `json` by default; with `--rows` `csv` (default) or `parquet`
     #[arg(long, value_parser = one_of(&FORMATS))]
     format: Option<Format>,
-    /// Compute one part of so many into `--into FOLDER`, for instance 17/200: a job of an array
+    /// Compute one of PARTS parts into `--into FOLDER`, for instance 17/200: one job of an array
     #[arg(long, value_name = "N/PARTS", requires = "into")]
     part: Option<PartOf>,
-    /// The folder for a part's files; what is there already is not computed again
+    /// Folder for the files of a part; chunks that have a file are not computed again
     #[arg(long, value_name = "FOLDER", requires = "part")]
     into: Option<PathBuf>,
-    /// Print the answer from the parts in this folder
+    /// Print the result from the parts in this folder
     #[arg(long, value_name = "FOLDER", conflicts_with = "part")]
     merge: Option<PathBuf>,
-    /// Print a row for each variant instead of the answer
+    /// Print one row for each variant instead of the result
     #[arg(long, conflicts_with = "part")]
     rows: bool,
 }
 
-/// One part of many, numbered from 0 or from 1: the last of those is the first of these.
+/// Part number of an array job, counted from 0 or from 1: number `parts` is the same part as number 0.
 #[derive(Debug, Clone, Copy)]
 struct PartOf {
     number: u64,
@@ -53,13 +54,13 @@ impl FromStr for PartOf {
             text.split_once('/').and_then(|(number, parts)| Some((number.parse().ok()?, parts.parse().ok()?)));
         match numbers {
             Some((number, parts)) if parts > 0 && number <= parts => Ok(Self { number, parts }),
-            _ => Err("write it as 17/200: the number of the part, from 0 or from 1, and how many there are"),
+            _ => Err("expected N/PARTS, for instance 17/200: the part's number, from 0 or 1, and the number of parts"),
         }
     }
 }
 
 impl PartOf {
-    /// Its share of the chunks: every so many-th, because neighbours often take equally long.
+    /// Returns the chunks of this part, `parts` apart, because neighbouring chunks often take equally long.
     fn chunks(self, study: &Study) -> Vec<u64> {
         (0..study.chunks()).filter(|chunk| chunk % self.parts == self.number % self.parts).collect()
     }
@@ -69,12 +70,12 @@ pub(super) fn run(command: &StudyCommand) -> Result<(), Failure> {
     log_errors();
     let format = command.format.unwrap_or(if command.rows { Format::Csv } else { Format::Json });
     if command.rows && !matches!(format, Format::Csv | Format::Parquet) {
-        return Err(Failure::BadInput("rows have the forms csv and parquet; choose one of them".into()));
+        return Err(Failure::BadInput("rows have no such format. Use `--format csv` or `--format parquet`".into()));
     }
     require_form::<StudyAnswer>(format)?;
     let study = Arc::new(Study::read(&read(&command.file)?, &Limits::OFFLINE).map_err(Problem::from)?);
     if command.rows && !study.has_rows() {
-        return Err(Failure::BadInput("a search has no rows. Its answer has the designs: leave out --rows".into()));
+        return Err(Failure::BadInput("a search has no rows. Leave out `--rows`: the result lists the designs".into()));
     }
     if let (Some(part), Some(folder)) = (command.part, &command.into) {
         return compute_part(&study, part, folder);
@@ -100,7 +101,7 @@ fn computed(study: &Arc<Study>) -> Result<Gathered, Failure> {
     Ok(gathered.into_inner())
 }
 
-/// Computes chunks on all cores, and hands over what each comes to.
+/// Computes chunks on all cores and passes each part to `take`.
 fn compute(
     study: &Arc<Study>,
     chunks: Vec<u64>,
@@ -119,7 +120,7 @@ fn compute(
     result
 }
 
-/// Computes the chunks of a part that have no file yet.
+/// Computes the chunks of a part that have no file yet, and checks the files of the others.
 fn compute_part(study: &Arc<Study>, part: PartOf, folder: &Path) -> Result<(), Failure> {
     let folder = PartFolder::create(folder)?;
     let done = folder.chunks()?;
@@ -149,7 +150,7 @@ fn read_part(study: &Study, folder: &PartFolder, chunk: u64) -> Result<Part, Fai
     study.read_part(chunk, folder.read(chunk)?).map_err(refused)
 }
 
-/// That an incomplete answer, which was printed, does not pass for a whole one.
+/// Returns an error if the printed result is incomplete.
 fn require_complete(study: &Study, gathered: &Gathered) -> Result<(), Failure> {
     const MOST_NAMED: usize = 10;
     let missing: Vec<_> = gathered.missing().collect();
@@ -160,7 +161,7 @@ fn require_complete(study: &Study, gathered: &Gathered) -> Result<(), Failure> {
     let more = if missing.len() > MOST_NAMED { ", …" } else { "" };
     let (count, all, named) = (missing.len(), study.chunks(), named.join(", "));
     let text = format!(
-        "the answer is incomplete: {count} of {all} chunks are missing ({named}{more}). Run the parts that failed again"
+        "the result is incomplete: {count} of {all} chunks are missing ({named}{more}). Run the failed parts again"
     );
     Err(io::Error::other(text).into())
 }
