@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use crate::BUILD;
 
-/// What every bit of an answer follows from besides what is asked, in a word: the build, and after a hyphen the arithmetic of the processor.
+/// Origin of an answer's bits besides the question: the build, a hyphen, and the arithmetic of the processor.
 pub fn origin() -> &'static str {
     static ORIGIN: LazyLock<String> = LazyLock::new(|| format!("{BUILD}-{:016x}", u64::from_be_bytes(arithmetic())));
     &ORIGIN

@@ -26,9 +26,9 @@ pub struct CoincidenceDegreeAnswer {
     pub coincidence_degree: f64,
     /// Range of positions in which a tooth touches the ring's flank.
     pub engagement: EngagementAnswer,
-    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
+    /// Numbers of teeth in mesh over the input angle: of one zone if the zones are alike, otherwise of all zones.
     pub teeth_in_mesh_per_zone: TeethInMesh,
-    /// Whether they are.
+    /// True if the zones are alike.
     #[serde(skip)]
     #[schema(ignore)]
     zones_are_alike: bool,
@@ -40,7 +40,7 @@ pub struct CoincidenceDegreeAnswer {
     pub findings: Vec<FindingAnswer>,
 }
 
-/// What is asked.
+/// The question for the contact ratio.
 #[derive(Debug)]
 pub struct CoincidenceDegree;
 

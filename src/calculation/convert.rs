@@ -14,13 +14,13 @@ const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::
 const SWITCHES: [DeprecatedField; 3] =
     [DeprecatedField::RingTeethBend, DeprecatedField::WaveGeneratorMoves, DeprecatedField::CornerContact];
 
-/// What a study's document calls its lists of pointers into the design.
+/// Names of the lists of pointers into the design, in a study document.
 const LISTS_OF_POINTERS: [&str; 3] = ["over", "free", "inputs"];
 
 /// The document that means the same without deprecated fields, of a design or of a study.
 ///
 /// # Errors
-/// Where the text is no such document, where it contradicts itself, and where a field has no replacement that holds for all variants of a study.
+/// Fails if the text is no such document or contradicts itself, or if a field has no replacement for all variants of a study.
 pub fn converted(text: &[u8]) -> Result<String, NoAnswer> {
     let mut tree = json::tree(text)?;
     if tree.at(&place(&["study"])).is_some() {
@@ -91,7 +91,7 @@ fn remove_if_empty(tree: &mut Tree, name: &str) {
     }
 }
 
-/// Of the base, the designs to start with, and the pointers to what varies.
+/// Converts the base, the designs to start with, and the pointers to the varied fields.
 fn convert_study(tree: &mut Tree) -> Result<(), NoAnswer> {
     let Tree::Object(fields) = tree else { return Ok(()) };
     for (name, value) in fields {

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 /// Takes CSV with a decimal point and commas between fields, and writes it with a decimal comma and semicolons.
 pub(crate) struct DecimalComma<W> {
     writer: W,
-    /// As far as it was written.
+    /// The field as far as it was written.
     field: Vec<u8>,
     is_quoted: bool,
 }

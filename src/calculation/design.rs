@@ -317,7 +317,7 @@ impl Design {
         Ok(violations)
     }
 
-    /// What a sweep is asked about friction, where there is any.
+    /// Returns the parameters of the losses, if friction is given.
     ///
     /// # Errors
     /// Every value that is out of its range, and a rating of a bearing that this wave generator has not.

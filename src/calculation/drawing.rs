@@ -24,12 +24,12 @@ mod stl;
 mod svg;
 mod three_mf;
 
-/// What is asked.
+/// The question for a drawing.
 #[derive(Debug)]
 pub struct Drawing {
-    /// What is drawn.
+    /// Part.
     pub part: DrawnPart,
-    /// What its clearances are for.
+    /// Source of the clearances.
     pub preset: Preset,
 }
 
@@ -51,7 +51,7 @@ const POINT_BYTES: u64 = 16;
 /// A pole in its polygon, of which there are four or more.
 const POLE_BYTES: u64 = 24;
 
-/// What a point takes in STEP, with the records that are remembered while they are written.
+/// Bytes of a point in STEP, with the records that are kept while they are written.
 const STEP_POINT_BYTES: u64 = 1120;
 
 impl Question for Drawing {

@@ -36,7 +36,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Its media type, with parameters.
+    /// Media type with parameters.
     pub const fn media_type(self) -> &'static str {
         match self {
             Self::Json => "application/json",
@@ -68,7 +68,7 @@ impl Format {
     }
 }
 
-/// How CSV is written.
+/// Writer of CSV.
 #[derive(Debug, Clone, Copy, Default, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields, default)]
 #[into_params(parameter_in = Query)]

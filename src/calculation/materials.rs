@@ -7,22 +7,22 @@ use utoipa::ToSchema;
 /// A material, as a document's `materials` spell its numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct MaterialPreset {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub title: &'static str,
     /// Young's modulus E.
     pub youngs_modulus_gpa: f64,
     /// Poisson's ratio ν.
     pub poissons_ratio: f64,
-    /// Where both are published.
+    /// Source of modulus and ratio.
     pub elasticity_source: &'static str,
     /// The contact stress that it may have, for `load.allowable_stress_mpa`: under rolling with lubrication, without a factor of safety; left out
     /// where none is published as a Hertz stress.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub allowable_stress_mpa: Option<f64>,
-    /// Where that is published.
+    /// Source.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub allowable_stress_source: Option<&'static str>,

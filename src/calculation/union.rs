@@ -10,7 +10,7 @@ pub(crate) struct KindSchema {
     pub(crate) word: &'static str,
     /// The name of its schema.
     pub(crate) name: String,
-    /// Its fields but for the word.
+    /// Fields without the word.
     pub(crate) fields: RefOr<Schema>,
 }
 

@@ -201,7 +201,7 @@ pub enum LawName {
 }
 
 impl ContactLaw {
-    /// Its name.
+    /// Name.
     pub const fn name(&self) -> LawName {
         match self {
             Self::Linear => LawName::Linear,

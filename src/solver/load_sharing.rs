@@ -18,7 +18,7 @@ use crate::tooth::{BallContact, Contacts, CornerContact, Flat, Pressure, ToothCo
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, tooth};
 
-/// How the approaches at a tooth's contacts add up to the rotation of the wave generator.
+/// Rule by which the approaches at a tooth's contacts add up to the rotation of the wave generator.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]

@@ -53,7 +53,8 @@ pub struct Mesh {
     told_apart: Option<u64>,
 }
 
-/// How many teeth, over the input angle: of a zone where the zones are alike, elsewhere, and given `deviations`, of all of them together.
+/// Numbers of teeth over the input angle: of one zone if the zones are alike, otherwise and with `deviations` of all
+/// zones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct TeethInMesh {

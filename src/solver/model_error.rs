@@ -121,7 +121,7 @@ impl MeasuredCase {
     }
 }
 
-/// What was measured of a case.
+/// Measured errors of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct Measured {
@@ -296,7 +296,7 @@ struct Row {
     percent: [[i32; 2]; 3],
 }
 
-/// Its flags: the ring's teeth bend, the wave generator moves, corners are met; tips are pointed, contacts have gaps.
+/// Makes a row. The flags: ring teeth bend, wave generator moves, corner contact; pointed tips, gaps.
 const fn row(
     compatibility: Compatibility,
     law: LawName,
@@ -308,7 +308,7 @@ const fn row(
     Row { case, percent }
 }
 
-/// What was measured of a model in such a case; nothing of a model that was not held against finite elements.
+/// Returns the measured errors of a model in such a case, or none if finite elements were not calculated for it.
 pub fn measured(load: &LoadParameters, case: Case) -> Option<Measured> {
     let LoadParameters { compatibility, law, ring_teeth_bend, wave_generator_moves, corner_contact, .. } = *load;
     let refinements = [ring_teeth_bend, wave_generator_moves, corner_contact];

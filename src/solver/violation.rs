@@ -370,7 +370,7 @@ pub enum Violation {
     OutOfRange {
         /// The parameter.
         parameter: Parameter,
-        /// Its value.
+        /// Value.
         value: f64,
         /// End of the range that the value exceeds.
         limit: f64,
@@ -386,7 +386,7 @@ pub enum Violation {
     CamTooSmall {
         /// Parameter that sets the size of the cam.
         parameter: Parameter,
-        /// Its value.
+        /// Value.
         radius_mm: f64,
         /// Value that it has to exceed.
         least_mm: f64,
@@ -440,7 +440,7 @@ pub enum Violation {
     NoCarrierAnnulus {
         /// Parameter that sets the wave generator's reach.
         parameter: Parameter,
-        /// Its value.
+        /// Value.
         value_mm: f64,
         /// Value that it has to stay below.
         limit_mm: f64,
@@ -472,7 +472,7 @@ pub enum Violation {
     ModificationLeavesNothing {
         /// The value of the modification.
         modified: Modified,
-        /// Its value.
+        /// Value.
         value: f64,
         /// Limit of the value, if it is a single number.
         limit: Option<f64>,

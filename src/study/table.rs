@@ -55,7 +55,7 @@ pub(crate) enum Cell {
 /// A column of a table with its values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableColumn {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// A value for each row.
     pub values: Values,
@@ -64,7 +64,7 @@ pub struct TableColumn {
 /// The values of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
-    /// Whole numbers, one in each row.
+    /// Integers, one in each row.
     Counts(Vec<u64>),
     /// Numbers; of an empty cell NaN.
     Numbers(Vec<f64>),

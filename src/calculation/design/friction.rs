@@ -112,7 +112,7 @@ pub struct RollingDocument {
 }
 
 impl FrictionDocument {
-    /// What a sweep is asked about friction.
+    /// Returns the parameters of the losses.
     ///
     /// # Errors
     /// Every value that is out of its range, and a rating of a bearing where the wave generator is no eccentric circle.
@@ -139,7 +139,7 @@ impl FrictionDocument {
         Some(PerContact { wave_generator, ring, carrier })
     }
 
-    /// What the life of the bearing follows from, where it is asked for.
+    /// Returns the data for the life of the bearing, if a load rating is given.
     fn bearing_rating(&self) -> Option<BearingRating> {
         let (rating_n, element) = match &self.wave_generator {
             WaveGeneratorFrictionDocument::Plain(_) => return None,

@@ -67,10 +67,10 @@ pub struct ClearanceDocument {
     pub carrier_um: f64,
 }
 
-/// What stands behind the contacts: numbers, or what is estimated from the parts as they are held.
+/// Compliance of the supports: numbers, or the estimates from the supports of the parts.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SeriesComplianceDocument {
-    /// What a sweep lists as `series_compliance_estimates` of the parts as they are held; a part without an estimate is rigid.
+    /// The sweep's `series_compliance_estimates` for the supports in `parts`. A part without an estimate is rigid.
     Estimated,
     /// Numbers.
     Given(CompliancesDocument),

@@ -40,9 +40,9 @@ pub struct SweepAnswer {
     pub enters_under_load: bool,
     /// The largest force and stress of each contact, over the states.
     pub peaks: PerContact<ContactPeaksAnswer>,
-    /// How many teeth mesh, over the input angle: of a zone where the zones are alike, elsewhere of all of them together.
+    /// Numbers of teeth in mesh over the input angle: of one zone if the zones are alike, otherwise of all zones.
     pub teeth_in_mesh_per_zone: TeethInMesh,
-    /// How many of them carry load, over the input angles of the sweep: with clearance fewer.
+    /// Numbers of teeth that carry load, over the input angles of the sweep. Clearance makes them fewer.
     pub loaded_teeth_per_zone: TeethInMesh,
     /// The states.
     pub states: StatesAnswer,
@@ -54,7 +54,7 @@ pub struct SweepAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub torque_capacity: Option<TorqueCapacity>,
-    /// The points of the duty, given `load.duty`: what stands beside it is of the one with the largest torque.
+    /// Points of the duty, with `load.duty`. The other fields belong to the point with the largest torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub duty: Option<DutyAnswer>,
@@ -69,10 +69,10 @@ pub struct SweepAnswer {
     pub radial_force_n: Option<RadialForceAnswer>,
     /// The complete model that was used. As `model` of the document it gives the same answer.
     pub model: ModelDocument,
-    /// How far the model is off elastic bodies.
+    /// Error of the model against elastic bodies.
     pub model_error: ModelError,
-    /// What gives way behind the contacts, estimated from the document's `parts`, each a number for `model.series_compliance_mm_per_n`; nothing of it is in the
-    /// forces. Of parts that cannot be made, and of balls, there are none.
+    /// Compliances of the supports, estimated from `parts`. Forces include them only with
+    /// `model.series_compliance_mm_per_n`. Balls, and parts that cannot be made, have none.
     pub series_compliance_estimates: Vec<EstimateAnswer>,
     /// Residuals of conditions that the results must meet.
     pub checks: ChecksAnswer,
@@ -92,9 +92,9 @@ pub struct LoadAnswer {
 /// The peaks of a contact.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ContactPeaksAnswer {
-    /// Of its normal force, in N.
+    /// Peak of the normal force, in N.
     pub force_n: Peak,
-    /// Of its Hertz stress, in MPa.
+    /// Peak of the Hertz stress, in MPa.
     pub stress_mpa: Peak,
     /// Half the width of the contact, in the plane of motion, where the stress has its peak.
     pub half_width_mm: f64,
@@ -206,7 +206,7 @@ impl WindUpAnswer {
     }
 }
 
-/// How well the results fulfil what must hold.
+/// Residuals of the conditions that the results must meet.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ChecksAnswer {
     /// Largest relative deviation of the input, ring and carrier torques from equilibrium, over the input angles.

@@ -87,7 +87,7 @@ pub(super) fn write(sweep: &SweepAnswer, writer: &mut dyn Write) -> io::Result<(
     writer.write_all(text.as_bytes())
 }
 
-/// What kuva numbers through the whole process, numbered anew: a picture's bytes follow from its content.
+/// Ids that kuva numbers through the whole process, numbered anew, so that a picture's bytes follow from its content.
 fn own_ids(text: &str) -> String {
     const ID: &str = "kuva-clip-";
     let mut parts = text.split(ID);

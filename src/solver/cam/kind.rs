@@ -10,9 +10,9 @@ use crate::violation::Parameter;
 /// Parameters of a wave generator, as each kind defines them in its own file.
 pub(super) struct Given {
     pub(super) lobes: i64,
-    /// What says how many lobes there are; none of a kind that has its own number.
+    /// Parameter for the number of lobes; none if the kind fixes it.
     pub(super) given_lobes: Option<Parameter>,
-    /// What says how large the cam is.
+    /// Parameter for the size of the cam.
     pub(super) size: (Parameter, f64),
     /// Parameter that sets the deviation from a circle.
     pub(super) shape: (Parameter, f64),

@@ -120,7 +120,7 @@ impl WaveGenerator {
         if is_path { mean_radius_mm - tooth_radius_mm } else { mean_radius_mm }
     }
 
-    /// Whether the cam is a circle off the axis.
+    /// True if the cam is an eccentric circle.
     pub const fn is_eccentric_circle(&self) -> bool {
         matches!(self, Self::Eccentric { .. })
     }

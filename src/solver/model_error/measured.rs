@@ -1,4 +1,4 @@
-//! How far the model is off elastic bodies, in per cent. Generated from `tests/finite_elements`: run
+//! Errors of the model against elastic bodies, in per cent. Generated from `tests/finite_elements`: run
 //! `WRITE_MODEL_ERRORS=1 cargo test -p toothwave-solver --test solver -- model_errors_are_generated`.
 
 use super::{Row, row};

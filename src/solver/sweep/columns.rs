@@ -186,7 +186,8 @@ pub struct TorqueCapacity {
     /// The contact that limits it; where `turns_past_teeth`, the one that is nearest to its allowable stress.
     #[cfg_attr(feature = "document", serde(rename = "limited_by"))]
     pub contact: Contact,
-    /// Whether no contact reaches its stress under any torque that the teeth carry: the wave generator moves on, and beyond this torque would turn past them.
+    /// True if no contact reaches its allowable stress under any torque that the teeth carry. Beyond this torque the wave
+    /// generator would turn past its teeth.
     /// Left out where it does not.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "std::ops::Not::not"))]
     pub turns_past_teeth: bool,
