@@ -317,7 +317,7 @@ fn rows_with_corners() -> impl Iterator<Item = String> {
 fn model_errors_are_generated_from_the_results() {
     let rows: Vec<_> = rows_without_corners().into_iter().chain(rows_with_corners()).collect();
     let table = format!(
-        "//! How far the model is off elastic bodies, in per cent. Generated from `tests/finite_elements`: run\n\
+        "//! Errors of the model against elastic bodies, in per cent. Generated from `tests/finite_elements`: run\n\
          //! `WRITE_MODEL_ERRORS=1 cargo test -p toothwave-solver --test solver -- model_errors_are_generated`.\n\n\
          use super::{{Row, row}};\n\
          use crate::contact::LawName::{{Johnson, Linear, Palmgren}};\n\
