@@ -15,7 +15,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use futures_util::StreamExt as _;
 use toothwave_calculation::design::Design;
-use toothwave_calculation::forms::{Format, Forms};
+use toothwave_calculation::forms::Forms;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::question::Question;
 use utoipa::IntoResponses;
