@@ -111,6 +111,27 @@ impl PartialEq for Quantity {
     }
 }
 
+/// All paths except those of drawings.
+const MECHANICS: [&str; 9] =
+    ["/drive", "/materials", "/load", "/model", "/modification", "/deviations", "/friction", "/parts", "/sweep"];
+
+const fn of_drive(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
+    Quantity {
+        name,
+        unit,
+        meaning,
+        is_flag: false,
+        needs: Needs::Drive,
+        source,
+        depends_on: &["/drive"],
+        said_by: None,
+        least: f64::NEG_INFINITY,
+        most: f64::INFINITY,
+        takes: Takes::Drive,
+        of,
+    }
+}
+
 const fn flag(name: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
     Quantity { is_flag: true, ..of_drive(name, "", meaning, source, of) }
 }

@@ -48,7 +48,7 @@ pub struct RaceBearing {
 
 /// Checked friction parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Friction(FrictionParameters);
+pub struct Friction(pub(super) FrictionParameters);
 
 /// Possible difference between an efficiency and that of an exact equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq)]

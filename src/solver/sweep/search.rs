@@ -11,9 +11,7 @@ mod seen;
 mod summit;
 
 use judge::Judge;
-use summit::{Bends, Nodes, Run};
 
-use crate::mesh::Mesh;
 use crate::root::NotConverged;
 use crate::sweep::points::Tolerance;
 use crate::{SolveError, Stop};
@@ -283,6 +281,7 @@ impl Search {
 
 #[cfg(test)]
 mod tests {
+    use super::summit::{Bends, Nodes, Run};
     use super::*;
     use crate::Drive;
     use crate::sweep::tried::PAPER_5_1;

@@ -2,10 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::Flat;
 use super::flat::FlatContact;
 use super::point::EllipticContact;
-use crate::approach::Corner;
 use crate::contact::HertzLine;
 
 /// Pressure model of a contact at a place.

@@ -7,7 +7,7 @@ use toothwave_solver::mesh::Mesh;
 use super::variant::most;
 use super::{
     Needs, OUTER_DIAMETER_MM, Of, Quantity, Source, TRANSMISSION_RATIO, Takes, backlash, efficiency, flag, geometry,
-    loss_ratio, mesh, of_capacity, of_losses, of_sweep, pressure_velocity, sweep,
+    loss_ratio, mesh, of_capacity, of_drive, of_losses, of_sweep, pressure_velocity, sweep,
 };
 
 /// Paths of the numbers of teeth and lobes.
@@ -16,27 +16,6 @@ const COUNTS: [&str; 4] =
 
 /// Paths that set the load and its torques.
 const TORQUE: [&str; 5] = ["/load", COUNTS[0], COUNTS[1], COUNTS[2], COUNTS[3]];
-
-/// All paths except those of drawings.
-const MECHANICS: [&str; 9] =
-    ["/drive", "/materials", "/load", "/model", "/modification", "/deviations", "/friction", "/parts", "/sweep"];
-
-const fn of_drive(name: &'static str, unit: &'static str, meaning: &'static str, source: Source, of: Of) -> Quantity {
-    Quantity {
-        name,
-        unit,
-        meaning,
-        is_flag: false,
-        needs: Needs::Drive,
-        source,
-        depends_on: &["/drive"],
-        said_by: None,
-        least: f64::NEG_INFINITY,
-        most: f64::INFINITY,
-        takes: Takes::Drive,
-        of,
-    }
-}
 
 /// All quantities, in the order in which they are listed.
 pub static QUANTITIES: [Quantity; 59] = [

@@ -17,7 +17,7 @@ use crate::tooth::line::{JohnsonLine, WIDEST_SHARE};
 use crate::tooth::{StressExponents, ToothLaw};
 
 pub(crate) use power_law::{Hertz, Linear, Palmgren, Power, PowerLaw};
-pub(crate) use two_parts::{Logarithm, NoPowerLaw, PalmgrenAndLinear, TwoParts};
+pub(crate) use two_parts::{Logarithm, NoPowerLaw, PalmgrenAndLinear};
 
 /// Largest number of rounds of a search. A tile that needs more uses the plain path.
 const MAX_ROUNDS: u32 = 60;
