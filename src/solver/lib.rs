@@ -38,6 +38,7 @@ pub mod backing;
 pub mod backlash;
 pub mod cam;
 pub mod contact;
+pub mod contact_law;
 pub mod drawing;
 pub mod drive;
 pub mod findings;
@@ -62,7 +63,8 @@ mod tooth_space;
 pub mod violation;
 
 pub use cam::WaveGenerator;
-pub use contact::{Contact, ContactLaw, LawName, Material, Materials, Part, PerContact};
+pub use contact::{Contact, Material, Materials, Part, PerContact};
+pub use contact_law::{ContactLaw, LawName};
 pub use drive::{Drive, DriveParameters, ToothShape};
 pub use findings::{Finding, FindingCode, Severity};
 pub use gaps::{Deviations, Modification};

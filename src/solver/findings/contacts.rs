@@ -3,11 +3,11 @@
 use super::FindingCode as Code;
 
 use super::{FATIGUE_LIMIT_STRESS_MPA, Finding, GROOVE_DEPTH_SHARE_OF_BALL, STEEL_TOLERANCE, groove_radius_mm};
-use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
+use crate::contact::{Contact, Material, Materials, PerContact, half_width_mm};
+use crate::contact_law::{ContactLaw, WIDE_SHARE};
 use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::LoadCase;
 use crate::sweep::{ContactPeaks, States};
-use crate::tooth::line::{WIDE_SHARE, least_length_mm};
 use crate::tooth::plain_approach_mm;
 
 const STEEL: Material = Material::STEEL;
@@ -101,11 +101,11 @@ pub(crate) fn widest_half_widths_mm(drive: &Drive, states: &States) -> impl Iter
 
 /// Returns the contacts that are too wide for Johnson's law, over all states.
 pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
-    let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
-    let tooth_radius_mm = drive.parameters().tooth_radius_mm;
+    let length_mm = load.parameters().law.reference_length_mm(drive.parameters().tooth_radius_mm);
+    let Some(length_mm) = length_mm else { return Vec::new() };
     widest_half_widths_mm(drive, states)
         .map(|(contact, half_width_mm)| {
-            let limit_mm = WIDE_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
+            let limit_mm = WIDE_SHARE * length_mm.get(contact);
             Finding::warning(Code::JohnsonBeyondHalfWidth, half_width_mm, limit_mm).at(contact)
         })
         .filter(|finding| finding.value > finding.limit)

@@ -3,11 +3,11 @@
 use super::loaded_drive::LoadedDrive;
 use super::tooth_state::ToothState;
 use crate::SolveError;
-use crate::contact::{Contact, ContactLaw, PerContact, half_width_mm};
+use crate::contact::{Contact, PerContact, half_width_mm};
+use crate::contact_law::WIDEST_SHARE;
 use crate::root::NotConverged;
 use crate::springs::{Rotation, Spring};
 use crate::tooth::Pressure;
-use crate::tooth::line::{WIDEST_SHARE, least_length_mm};
 
 /// Stress that limits the torque at one input angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,14 +135,14 @@ impl<'a> LoadedDrive<'a> {
 
     /// Returns the end of Johnson's law if some contact is wider at this rotation than the law allows.
     pub(super) fn law_end(&self, teeth: &[ToothState], rotation: &Rotation) -> Result<Option<LawEnd>, SolveError> {
-        let ContactLaw::Johnson { depth_mm } = &self.law else { return Ok(None) };
+        let tooth_radius_mm = self.drive.parameters().tooth_radius_mm;
+        let Some(length_mm) = self.law.reference_length_mm(tooth_radius_mm) else { return Ok(None) };
         let is_beyond = |tooth: &ToothState| tooth.spring.displacement_mm(rotation) >= tooth.spring.approach.limit_mm();
         if !teeth.iter().any(is_beyond) {
             return Ok(None);
         }
-        let tooth_radius_mm = self.drive.parameters().tooth_radius_mm;
         let tooth_width_mm = self.drive.tooth_width_mm();
-        let limit_mm = |contact| WIDEST_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
+        let limit_mm = |contact| WIDEST_SHARE * length_mm.get(contact);
         let limit = Self::first_to_reach(teeth, |tooth, contact| {
             // The half-width's square is proportional to the force.
             let pressure = tooth.pressure.get(contact);

@@ -1,7 +1,8 @@
 //! A load: torque, materials, contact law, compatibility, clearances and profile modifications.
 
 use super::equilibrium::Weights;
-use crate::contact::{ContactLaw, Material, Materials, Part, PerContact};
+use crate::contact::{Material, Materials, Part, PerContact};
+use crate::contact_law::ContactLaw;
 use crate::drive::{Draft, Drive, DriveParameters, ToothShape};
 use crate::gaps::{Deviations, Modification};
 use crate::mesh::Mesh;

@@ -12,8 +12,8 @@ use pulp::Simd;
 
 use super::lanes::repeat_each;
 use crate::contact::{Contact, PerContact};
+use crate::contact_law::{LogarithmicTerm, WIDEST_SHARE};
 use crate::load_sharing::{Compatibility, LoadedDrive};
-use crate::tooth::line::{JohnsonLine, WIDEST_SHARE};
 use crate::tooth::{StressExponents, ToothLaw};
 
 pub(crate) use power_law::{Hertz, Linear, Palmgren, Power, PowerLaw};
@@ -355,10 +355,10 @@ impl Sharing {
                 Self::PalmgrenAndLinear(NoPowerLaw { law, has_gaps })
             }
             ToothLaw::Hertz => Self::Hertz(PowerLaw { power: Hertz, has_gaps }),
-            ToothLaw::Johnson { law, series_compliance_mm_per_n: series } => {
+            ToothLaw::Logarithmic { law, series_compliance_mm_per_n: series } => {
                 let tooth_radius_mm = loaded.drive().parameters().tooth_radius_mm;
                 let reference = |contact| {
-                    let JohnsonLine { growth_mm_per_n, length_mm, .. } = *law.get(contact);
+                    let LogarithmicTerm { growth_mm_per_n, length_mm, .. } = *law.get(contact);
                     let of_curvature = length_mm * length_mm / (4.0 * growth_mm_per_n);
                     match contact {
                         // σ² = F Σ E*/(π L1), F = 1 at the wave generator and F_K/F_H at the ring.

@@ -7,8 +7,8 @@ use super::{
     last_below, last_of, least_torque, start_above, turn_to_limit,
 };
 use crate::contact::PerContact;
+use crate::contact_law::PALMGREN_EXPONENT;
 use crate::sweep::fast::lanes::{cube_root, inverse_tenth_root, ninth_root, repeat_each};
-use crate::tooth::PALMGREN_EXPONENT;
 use crate::tooth::point::EllipticContact;
 
 /// Power law `ξ = c F^p`.

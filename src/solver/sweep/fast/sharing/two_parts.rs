@@ -8,8 +8,8 @@ use super::{
     least_margin, least_torque, press, start_above, turn_to_limit,
 };
 use crate::contact::PerContact;
+use crate::contact_law::PALMGREN_EXPONENT;
 use crate::sweep::fast::lanes::{LANES, inverse_tenth_root, largest, ln, ln_roughly};
-use crate::tooth::PALMGREN_EXPONENT;
 
 /// A law without a closed form for both the forces and the rotation.
 pub(crate) struct NoPowerLaw<L> {
