@@ -236,6 +236,20 @@ pub struct Backings {
 impl Backings {
     /// Returns the compliant parts as manufactured and supported. Only cylinders, with or without flats, load their
     /// parts along a line.
+    ///
+    /// ```
+    /// use toothwave_solver::backing::{Backings, Rim, Support};
+    /// use toothwave_solver::drive::Draft;
+    /// use toothwave_solver::parts::PartsParameters;
+    /// use toothwave_solver::{DriveParameters, LoadParameters};
+    ///
+    /// let draft = Draft::new(&DriveParameters::default()).unwrap();
+    /// let drive = draft.drive().unwrap();
+    /// let support = Support { rim: Some(Rim::Housed), ..Support::default() };
+    /// let backings = Backings::of(&drive, &draft, &PartsParameters::default(), support);
+    /// let mut load = LoadParameters::default();
+    /// load.series_compliance_mm_per_n = backings.series_compliance_mm_per_n(&drive, &load);
+    /// ```
     pub fn of(drive: &Drive, draft: &Draft, parts: &PartsParameters, support: Support) -> Self {
         let mut backings = Self { finger: None, rim: None, housed: None, cam: None, support };
         if matches!(drive.parameters().tooth, ToothShape::Ball { .. }) {

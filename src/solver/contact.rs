@@ -106,7 +106,7 @@ impl<T> PerContact<T> {
     }
 }
 
-/// An isotropic elastic material.
+/// An isotropic elastic material; by default steel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
     /// Young's modulus E, in GPa.
@@ -125,8 +125,14 @@ impl Material {
     }
 }
 
-/// Materials of all parts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+impl Default for Material {
+    fn default() -> Self {
+        Self::STEEL
+    }
+}
+
+/// Materials of all parts; by default steel.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Materials {
     /// Material of the wave generator.
     pub wave_generator: Material,

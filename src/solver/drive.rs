@@ -13,7 +13,7 @@ use crate::violation::{Parameter, Violation};
 
 pub use draft::Draft;
 
-/// Parameters of a drive (docs/explanation/theory.md section 1).
+/// Parameters of a drive (docs/explanation/theory.md section 1). The default is the drive of the paper's section 5.1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveParameters {
     /// Wave generator, which pushes the teeth outward.
@@ -30,6 +30,20 @@ pub struct DriveParameters {
     pub ring_teeth: i64,
     /// Radius of a bore that truncates the ring's teeth.
     pub tip_radius_mm: Option<f64>,
+}
+
+impl Default for DriveParameters {
+    fn default() -> Self {
+        Self {
+            wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
+            teeth: 28,
+            installed: 28,
+            tooth_radius_mm: 5.0,
+            tooth: ToothShape::Cylinder { width_mm: 15.0 },
+            ring_teeth: 26,
+            tip_radius_mm: None,
+        }
+    }
 }
 
 /// Shape of a tooth of radius `r` (docs/explanation/theory.md section 2.10).
@@ -131,6 +145,18 @@ pub enum DriveError {
 
 impl Drive {
     /// Checks the parameters and builds the drive.
+    ///
+    /// ```
+    /// use toothwave_solver::{Drive, DriveParameters, drive::DriveError};
+    ///
+    /// let drive = Drive::new(&DriveParameters::default()).unwrap();
+    /// assert_eq!(drive.transmission_ratio(), 14.0);
+    ///
+    /// // Neighbouring teeth touch.
+    /// let thick = DriveParameters { tooth_radius_mm: 7.0, ..DriveParameters::default() };
+    /// let Err(DriveError::Impossible(violations)) = Drive::new(&thick) else { panic!() };
+    /// println!("{}", violations[0]);
+    /// ```
     ///
     /// # Errors
     /// Returns every reason why the drive cannot exist.

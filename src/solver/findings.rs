@@ -179,6 +179,22 @@ impl Finding {
 
 /// Returns the findings about the drive itself.
 ///
+/// ```
+/// use toothwave_solver::{Drive, DriveParameters, FindingCode, WaveGenerator, findings};
+///
+/// let undercut = Drive::new(&DriveParameters {
+///     wave_generator: WaveGenerator::Ellipse { semi_major_mm: 50.7, semi_minor_mm: 49.3 },
+///     teeth: 80,
+///     installed: 40,
+///     ring_teeth: 78,
+///     tooth_radius_mm: 1.5,
+///     ..DriveParameters::default()
+/// })
+/// .unwrap();
+/// let found = findings::of_drive(&undercut).unwrap();
+/// assert!(found.iter().any(|finding| finding.code == FindingCode::Undercut));
+/// ```
+///
 /// # Errors
 /// [`NotConverged`] from the geometry.
 pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {

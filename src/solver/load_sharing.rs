@@ -6,7 +6,10 @@ mod load;
 mod loaded_drive;
 mod tooth_state;
 
+#[doc(hidden)]
 pub use capacity::{LawEnd, TorqueLimit};
 pub use load::{Compatibility, LoadCase, LoadParameters, Torque};
+#[doc(hidden)]
 pub use loaded_drive::LoadedDrive;
+#[doc(hidden)]
 pub use tooth_state::ToothState;

@@ -68,6 +68,14 @@ pub(crate) const fn greatest_common_divisor(one: u64, other: u64) -> u64 {
 
 impl Mesh {
     /// Returns the mesh of a drive whose items are all alike.
+    ///
+    /// ```
+    /// use toothwave_solver::mesh::Mesh;
+    /// use toothwave_solver::{Drive, DriveParameters};
+    ///
+    /// let mesh = Mesh::new(&Drive::new(&DriveParameters::default()).unwrap());
+    /// println!("contact ratio {:.2}, {} teeth of a lobe", mesh.coincidence_degree(), mesh.teeth_in_mesh());
+    /// ```
     pub fn new(drive: &Drive) -> Self {
         let p = drive.parameters();
         // Counts of a checked drive are positive and small.

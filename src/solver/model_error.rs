@@ -270,6 +270,7 @@ impl MeasuredRange {
 /// elements, in drives of the same case (docs/explanation/validation.md).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+#[non_exhaustive]
 pub struct ModelError {
     /// Errors of the case; left out if the law was not measured.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
@@ -328,6 +329,18 @@ pub fn case_of(drive: &Drive, load: &LoadCase, deviations: &Deviations) -> Case 
 }
 
 /// Returns the expected model error for this drive, load and sweep, with parts of this support and these shares.
+///
+/// ```
+/// use toothwave_solver::sweep::{Points, sweep};
+/// use toothwave_solver::{Deviations, model_error};
+/// # use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never};
+/// let drive = Drive::new(&DriveParameters::default()).unwrap();
+/// let load = LoadCase::new(&LoadParameters::default()).unwrap();
+///
+/// let sweep = sweep(&drive, &load, Points::samples(100).unwrap(), &Never).unwrap();
+/// let error = model_error::of(&drive, &load, &Deviations::default(), &sweep, None).unwrap();
+/// assert!(error.measured.is_some());
+/// ```
 ///
 /// # Errors
 /// [`NotConverged`] from the geometry.

@@ -347,7 +347,7 @@ fn pressure_angle_above_calculated_drives_is_reported() {
         let parameters = DriveParameters { wave_generator: ellipse(50.7, semi_minor_mm), ..PAPER_5_2 };
         let drive = Drive::new(&parameters).unwrap();
         let load =
-            LoadParameters { law: ContactLaw::Johnson { depth_mm: PerContact::default() }, ..load(3.0, VirtualWork) };
+            LoadParameters { law: ContactLaw::JOHNSON, ..load(3.0, VirtualWork) };
         let sweep = swept(&parameters, &load, 20);
         let case = LoadCase::new(&load).unwrap();
         let error = model_error::of(&drive, &case, &Deviations::default(), &sweep, None).unwrap();
@@ -373,7 +373,7 @@ fn wind_up_above_calculated_drives_is_reported() {
     };
     for (parameters, gap_um, off) in [(path(63.0, 0.3, 5.0), 10.0, 0.016), (path(14.38, 0.061, 1.1118), 7.4, 0.055)] {
         let drive = Drive::new(&parameters).unwrap();
-        let law = ContactLaw::Johnson { depth_mm: PerContact::default() };
+        let law = ContactLaw::JOHNSON;
         let clearance_um = PerContact { ring: gap_um, ..PerContact::default() };
         let load = LoadParameters { law, clearance_um, ..load(1e-5, VirtualWork) };
         let sweep = swept(&parameters, &load, 400);

@@ -93,6 +93,12 @@ pub(crate) trait Law {
     }
 }
 
+impl Default for ContactLaw {
+    fn default() -> Self {
+        Self::JOHNSON
+    }
+}
+
 impl ContactLaw {
     /// Johnson's law, each body fixed at the depth of the tooth's radius.
     pub const JOHNSON: Self =

@@ -3,14 +3,12 @@
 use super::FindingCode as Code;
 
 use super::{FATIGUE_LIMIT_STRESS_MPA, Finding, GROOVE_DEPTH_SHARE_OF_BALL, STEEL_TOLERANCE, groove_radius_mm};
-use crate::contact::{Contact, Material, Materials, PerContact, half_width_mm};
+use crate::contact::{Contact, Materials, PerContact, half_width_mm};
 use crate::contact_law::{ContactLaw, WIDE_SHARE};
 use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::LoadCase;
 use crate::sweep::{ContactPeaks, States};
 use crate::tooth::plain_approach_mm;
-
-const STEEL: Material = Material::STEEL;
 
 /// Returns half the width at the edges of a groove of radius `r_g` and depth `t`: `√(t (2r_g - t))`, at most the ball's
 /// radius.
@@ -44,8 +42,7 @@ pub fn of_contacts(
         findings.push(Finding::info(Code::LinearLawTooStiff, 1e3 * linear_mm, 1e3 * palmgren_mm));
     }
     if p.law == ContactLaw::Palmgren {
-        let steel = Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL };
-        let steel_mpa = steel.contact_modulus_mpa(Contact::Ring);
+        let steel_mpa = Materials::default().contact_modulus_mpa(Contact::Ring);
         // A flat has its own law, which depends on the modulus.
         for (contact, _) in peaks.iter().filter(|&(contact, _)| !is_flat(drive, contact)) {
             let contact_mpa = p.materials.contact_modulus_mpa(contact);

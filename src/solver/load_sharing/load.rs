@@ -32,7 +32,8 @@ pub enum Torque {
     Output(f64),
 }
 
-/// Parameters of a load.
+/// Parameters of a load. The default is 20 N·m at the wave generator, steel, Johnson's law and virtual work, without
+/// gaps and refinements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadParameters {
     /// Materials of all parts.
@@ -62,6 +63,25 @@ pub struct LoadParameters {
     pub carrier: CarrierRadii,
     /// Allowable stress of each contact, which sets the torque capacity.
     pub allowable_stress_mpa: Option<PerContact<f64>>,
+}
+
+impl Default for LoadParameters {
+    fn default() -> Self {
+        Self {
+            materials: Materials::default(),
+            torque: Torque::Input(20.0),
+            compatibility: Compatibility::default(),
+            law: ContactLaw::default(),
+            series_compliance_mm_per_n: PerContact::default(),
+            ring_teeth_bend: false,
+            wave_generator_moves: false,
+            corner_contact: false,
+            clearance_um: PerContact::default(),
+            modification: Modification::default(),
+            carrier: CarrierRadii::default(),
+            allowable_stress_mpa: None,
+        }
+    }
 }
 
 impl LoadParameters {
@@ -125,6 +145,22 @@ pub struct LoadCase(LoadParameters);
 
 impl LoadCase {
     /// Checks the parameters and builds the load.
+    ///
+    /// ```
+    /// use toothwave_solver::{Compatibility, ContactLaw, LoadCase, LoadParameters, PerContact, Torque};
+    ///
+    /// let load = LoadCase::new(&LoadParameters {
+    ///     torque: Torque::Output(280.0),
+    ///     clearance_um: PerContact { wave_generator: 5.0, ring: 5.0, carrier: 10.0 },
+    ///     ..LoadParameters::default()
+    /// });
+    /// assert!(load.is_ok());
+    ///
+    /// // Johnson's law cannot be combined with the paper's projection; the linear one can.
+    /// let projected = LoadParameters { compatibility: Compatibility::Projection, ..LoadParameters::default() };
+    /// assert!(LoadCase::new(&projected).is_err());
+    /// assert!(LoadCase::new(&LoadParameters { law: ContactLaw::Linear, ..projected }).is_ok());
+    /// ```
     ///
     /// # Errors
     /// Returns every value that is out of its range.

@@ -283,8 +283,7 @@ impl Search {
 mod tests {
     use super::summit::{Bends, Nodes, Run};
     use super::*;
-    use crate::Drive;
-    use crate::sweep::tried::PAPER_5_1;
+    use crate::{Drive, DriveParameters};
 
     /// Returns a lap of sixteen intervals with one tooth, each moment filled in by the function.
     fn seen_by(put_down: impl Fn(&mut Seen, f64)) -> Seen {
@@ -389,7 +388,7 @@ mod tests {
 
     #[test]
     fn splits_piece_where_tooth_reaches_relief_start() {
-        let mesh = Mesh::new(&Drive::new(&PAPER_5_1).expect("a possible drive"));
+        let mesh = Mesh::new(&Drive::new(&DriveParameters::default()).expect("a possible drive"));
         let whole = Piece { lap: 0, start: 0.0, end: 1.0, places: 7, at_start: None, at_end: None };
         for start_deg in [1.0, 13.4, 20.0, 31.0, 50.0, 89.0] {
             let fraction = mesh.fraction_at_deg(start_deg);

@@ -21,6 +21,7 @@ pub struct Peak {
 
 /// Peaks of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct ContactPeaks {
     /// Peak of the force, in N.
     pub force_n: Peak,
@@ -142,6 +143,7 @@ impl TorqueCapacity {
 
 /// Summary of a sweep without its states, for searches over millions of drives.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SweepPeaks {
     /// Peaks over the states.
     pub contacts: PerContact<ContactPeaks>,

@@ -9,6 +9,7 @@ use crate::springs::WindUp;
 /// States of a sweep, by input angle and then tooth number: columns of equal length with one entry for each state. If
 /// the zones are alike, the teeth of one zone represent all. Otherwise the teeth of all zones are listed ([`Mesh`]).
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct States {
     /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
@@ -32,6 +33,7 @@ pub struct States {
 
 /// Quantities of all teeth together at an input angle: columns of equal length with one entry for each input angle.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct InputAngles {
     /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
@@ -46,6 +48,7 @@ pub struct InputAngles {
 /// A sweep over one period. If items deviate, it covers the load periods after which all items are back in their
 /// positions.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Sweep {
     /// Mesh of the sweep.
     pub mesh: Mesh,
