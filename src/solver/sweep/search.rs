@@ -283,6 +283,7 @@ impl Search {
 mod tests {
     use super::summit::{Bends, Nodes, Run};
     use super::*;
+    use crate::mesh::Mesh;
     use crate::{Drive, DriveParameters};
 
     /// Returns a lap of sixteen intervals with one tooth, each moment filled in by the function.
