@@ -17,12 +17,10 @@ use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, Los
 use toothwave_solver::losses::{Mechanism, period};
 use toothwave_solver::model_error as error_of_model;
 use toothwave_solver::ring::FlankEnd;
-use toothwave_solver::sweep as solver;
-use toothwave_solver::sweep::Points;
+use toothwave_solver::sweep::{self as solver, Points};
 use toothwave_solver::{Contact, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings};
 
-use crate::design;
-use crate::design::{Design, ModelDocument};
+use crate::design::{self, Design, ModelDocument};
 use crate::field::FieldCode;
 use crate::findings::{Causes, FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};

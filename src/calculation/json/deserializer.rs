@@ -1,7 +1,6 @@
 //! Reading a value from a tree, with the path of whatever is wrong.
 
-use serde::de;
-use serde::de::{MapAccess, Unexpected, Visitor};
+use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
 
 use super::fault::Fault;
 use super::tree::{ANY, Tree};

@@ -1,7 +1,6 @@
 //! What is wrong in a document, and where.
 
-use serde::de;
-use serde::de::Unexpected;
+use serde::de::{self, Unexpected};
 
 use crate::field::FieldCode;
 

@@ -1,7 +1,6 @@
 //! States of a sweep as columns, and as CSV.
 
-use std::io;
-use std::io::Write;
+use std::io::{self, Write};
 
 use serde::Serialize;
 

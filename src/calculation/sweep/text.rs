@@ -1,7 +1,6 @@
 //! A sweep as text.
 
-use std::io;
-use std::io::Write;
+use std::io::{self, Write};
 
 use crate::findings::write_findings;
 use crate::json::word;
