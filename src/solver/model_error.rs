@@ -6,7 +6,7 @@ mod measured;
 use measured::MEASURED;
 
 use crate::backing::{Backing, Fingers, Rim, Shares, Support};
-use crate::contact::{Contact, Material, PerContact};
+use crate::contact::{Contact, Material};
 use crate::contact_law::{ContactLaw, LawName, WIDE_SHARE};
 use crate::drive::{Drive, ToothShape};
 use crate::findings::{SOFT_BACKING_SHARE, WIND_UP_SHARE_OF_PERIOD, WIND_UP_TIMES_LOBES_RAD, widest_half_widths_mm};

@@ -13,7 +13,6 @@ use serde::{Deserialize, Serialize};
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
-use toothwave_calculation::question::Question as _;
 use toothwave_calculation::{json, question};
 
 use crate::ask::beyond;
@@ -22,7 +21,7 @@ use crate::evaluate::Evaluator;
 use crate::map::Map;
 use crate::quantity::Quantity;
 use crate::rows::{Rows, RowsPart};
-use crate::search::{Island, IslandPart, Search, SearchAnswer};
+use crate::search::{IslandPart, Search, SearchAnswer};
 use crate::sensitivity::Sensitivity;
 use crate::table::Table;
 use crate::tolerance::Tolerance;

@@ -346,8 +346,7 @@ fn pressure_angle_above_calculated_drives_is_reported() {
     for semi_minor_mm in [49.5, 49.3, 49.1, 48.9] {
         let parameters = DriveParameters { wave_generator: ellipse(50.7, semi_minor_mm), ..PAPER_5_2 };
         let drive = Drive::new(&parameters).unwrap();
-        let load =
-            LoadParameters { law: ContactLaw::JOHNSON, ..load(3.0, VirtualWork) };
+        let load = LoadParameters { law: ContactLaw::JOHNSON, ..load(3.0, VirtualWork) };
         let sweep = swept(&parameters, &load, 20);
         let case = LoadCase::new(&load).unwrap();
         let error = model_error::of(&drive, &case, &Deviations::default(), &sweep, None).unwrap();

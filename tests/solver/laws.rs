@@ -770,7 +770,11 @@ fn only_balls_take_hertz_beside_fixed() {
     };
     let fixed = ContactLaw::Fixed(PerContact { wave_generator: 1e5, ring: 1e5, carrier: 1e5 });
     assert!(accepts(ContactLaw::Hertz, &ball) && accepts(fixed, &ball));
-    assert!(!accepts(ContactLaw::Linear, &ball) && !accepts(ContactLaw::Palmgren, &ball) && !accepts(ContactLaw::JOHNSON, &ball));
+    assert!(
+        !accepts(ContactLaw::Linear, &ball)
+            && !accepts(ContactLaw::Palmgren, &ball)
+            && !accepts(ContactLaw::JOHNSON, &ball)
+    );
     assert!(!accepts(ContactLaw::Hertz, &ToothContact::Cylinder));
 }
 

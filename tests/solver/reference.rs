@@ -11,8 +11,8 @@ use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{self, Points, States, Sweep};
 use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials,
-    Never, PerContact, SolveError, ToothShape, Torque,
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
+    PerContact, SolveError, ToothShape, Torque,
 };
 
 use crate::drives::{ellipse, everywhere};

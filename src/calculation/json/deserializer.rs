@@ -4,7 +4,6 @@ use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
 
 use super::fault::Fault;
 use super::tree::{ANY, Tree};
-use super::word;
 
 impl Tree {
     fn unexpected(&self) -> Unexpected<'_> {

@@ -4,7 +4,6 @@ use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Serialize, de};
 
 use super::fault::Fault;
-use super::tree;
 
 /// A JSON value, parsed or constructed. Documents are read from it.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use crate::findings::write_findings;
 use crate::json::word;
 use crate::sweep::answer::SweepAnswer;
+use crate::sweep::{backing, losses, model_error};
 
 impl SweepAnswer {
     pub(super) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {

@@ -6,8 +6,8 @@ use toothwave_solver::mesh::Mesh;
 
 use super::variant::most;
 use super::{
-    Needs, OUTER_DIAMETER_MM, Of, Quantity, Source, TRANSMISSION_RATIO, Takes, backlash, efficiency, flag, geometry,
-    loss_ratio, mesh, of_capacity, of_drive, of_losses, of_sweep, pressure_velocity, sweep,
+    OUTER_DIAMETER_MM, Quantity, Source, TRANSMISSION_RATIO, Takes, backlash, efficiency, flag, geometry, loss_ratio,
+    mesh, of_capacity, of_drive, of_losses, of_sweep, pressure_velocity, sweep,
 };
 
 /// Paths of the numbers of teeth and lobes.

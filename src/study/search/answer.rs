@@ -8,7 +8,6 @@ use utoipa::ToSchema;
 
 use super::Search;
 use super::island::{IslandPart, Scan, variable_values};
-use crate::ask::beyond;
 use crate::evaluate::Evaluator;
 use crate::limit::{Bound, Limit};
 use crate::optimise::merged;

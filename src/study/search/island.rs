@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 use toothwave_solver::Stop;
 
 use super::{SCAN_SHARE, Search, TRUE_EVALUATIONS};
-use crate::ask::beyond;
 use crate::evaluate::{Evaluator, Outcome, Stopped};
 use crate::optimise::{Optimiser, Plan};
 use crate::point::{Judged, Point};

@@ -7,8 +7,7 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::field::{FieldCode, FieldError};
 use toothwave_calculation::json::{Fault, Tree, path};
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
-use toothwave_calculation::question;
-use toothwave_calculation::question::Question as _;
+use toothwave_calculation::question::{self, Question as _};
 use toothwave_calculation::sweep::Sweep;
 
 use crate::ask::{all_named, beyond, fault};

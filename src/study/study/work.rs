@@ -2,12 +2,11 @@
 
 use std::sync::Arc;
 
-use toothwave_calculation::question::Question as _;
 use toothwave_solver::Stop;
 
 use super::{Kind, Part, Study};
 use crate::evaluate::Stopped;
-use crate::rows::{Rows, RowsWork};
+use crate::rows::RowsWork;
 use crate::search::Island;
 
 /// A chunk that is being computed, one variant a step. It can be paused between two steps.

@@ -21,7 +21,6 @@ pub struct Peak {
 
 /// Peaks of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct ContactPeaks {
     /// Peak of the force, in N.
     pub force_n: Peak,

@@ -9,7 +9,6 @@ use crate::springs::WindUp;
 /// States of a sweep, by input angle and then tooth number: columns of equal length with one entry for each state. If
 /// the zones are alike, the teeth of one zone represent all. Otherwise the teeth of all zones are listed ([`Mesh`]).
 #[derive(Debug, Clone, PartialEq, Default)]
-#[non_exhaustive]
 pub struct States {
     /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
@@ -33,7 +32,6 @@ pub struct States {
 
 /// Quantities of all teeth together at an input angle: columns of equal length with one entry for each input angle.
 #[derive(Debug, Clone, PartialEq, Default)]
-#[non_exhaustive]
 pub struct InputAngles {
     /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
