@@ -108,7 +108,6 @@ impl Mesh {
         Self { listed_spacings: 0.5 * self.installed as f64 / self.teeth_at_each_place(), ..self }
     }
 
-    /// Returns true if teeth before the flank are listed.
     pub(crate) fn lists_teeth_before_flank(&self) -> bool {
         self.listed_spacings > self.engaged_spacings
     }

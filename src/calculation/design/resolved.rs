@@ -286,7 +286,6 @@ impl Design {
         self
     }
 
-    /// Returns the parts for keys.
     pub(crate) fn parts_in_key(&self) -> impl Encode + '_ {
         (&self.parts, self.clearance_in_key())
     }
@@ -318,7 +317,6 @@ impl Design {
 }
 
 impl ModelDocument {
-    /// Returns the deprecated switches.
     const fn switches(&self) -> [(DeprecatedField, Option<bool>); 3] {
         [
             (DeprecatedField::RingTeethBend, self.ring_teeth_bend),

@@ -21,7 +21,6 @@ pub struct Draft {
     pub(crate) greatest_set_back_mm: Option<f64>,
     pub(crate) installed: Option<i64>,
     pub(crate) tooth_radius_mm: Option<f64>,
-    /// Half the width of a slot.
     pub(crate) slot_half_width_mm: Option<f64>,
     /// `s`, if carrier and ring differ by one tooth for each lobe.
     pub(crate) sense: Option<f64>,

@@ -193,7 +193,6 @@ impl<'a> LoadedDrive<'a> {
         self.contacts.flat()
     }
 
-    /// Returns the gaps.
     pub(crate) const fn gaps(&self) -> &Gaps<'a> {
         &self.gaps
     }

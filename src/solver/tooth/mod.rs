@@ -291,7 +291,6 @@ impl Contacts {
         }
     }
 
-    /// Returns a contact of balls.
     pub(crate) fn ball(&self, contact: Contact) -> Option<BallContact> {
         let ToothContact::Ball { groove_radius_mm } = &self.shape else { return None };
         let r = self.tooth_radius_mm;

@@ -15,7 +15,6 @@ use crate::mesh::Mesh;
 use crate::sweep::columns::{TorqueBalance, TorqueCapacity, worse};
 
 impl Limit {
-    /// Returns the torque capacity at an input angle.
     pub(super) fn capacity(&self, loaded: &LoadedDrive<'_>, input_angle_deg: f64) -> TorqueCapacity {
         let input_torque_nm = 1e-3 * (loaded.zones() * self.torque_nmm);
         let output_torque_nm = input_torque_nm * loaded.drive().teeth_per_wave();

@@ -75,7 +75,6 @@ impl Piece {
         std::iter::once(before).chain(cut.map(|start| Self { start, at_start, ..self }))
     }
 
-    /// Returns the position at a place.
     pub(crate) fn position(&self, mesh: &Mesh, place: u64, fraction: f64) -> Position {
         self.exactly_at(fraction)
             .find(|at| at.place == place)

@@ -61,12 +61,10 @@ impl Seen {
         self.pressed.extend(pressed);
     }
 
-    /// Returns the values of a moment.
     pub(crate) fn values(&self, moment: usize) -> &[f64] {
         &self.values[moment * self.stride()..][..self.stride()]
     }
 
-    /// Returns a load of a tooth at a moment.
     pub(crate) fn load(&self, moment: usize, quantity: usize, tooth: usize) -> f64 {
         self.values(moment)[quantity * self.teeth + tooth]
     }
