@@ -17,8 +17,7 @@ use crate::harness::{Effort, Spread};
 use crate::reference::Setup;
 use crate::turns::{Contestant, Failure, take_turns};
 
-const JOHNSON: ContactLaw =
-    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+const JOHNSON: ContactLaw = ContactLaw::JOHNSON;
 
 /// The paper's case 5.2: undercut, every second slot filled.
 const PAPER_5_2: DriveParameters = DriveParameters {

@@ -11,7 +11,6 @@ use toothwave_solver::model_error::{self, Beyond, ModelError};
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
     Compatibility, ContactLaw, Deviations, Drive, LawName, LoadCase, LoadParameters, PerContact, SolveError, Stop,
-    ToothShape,
 };
 use utoipa::ToSchema;
 
@@ -219,15 +218,10 @@ fn admitted_samples(mesh: Mesh, max_states: u64) -> impl Iterator<Item = Samples
 /// Returns the design's own model, then every other form of compatibility with each law that is possible for it and the
 /// teeth, and that needs no further numbers.
 fn models(drive: &Drive, own: &LoadParameters, refinements: Refinements) -> Vec<LoadParameters> {
-    let laws = match drive.parameters().tooth {
-        ToothShape::Ball { .. } => vec![own.law, ContactLaw::Hertz],
-        ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => {
-            // Other depths would be another model with the same name.
-            let johnson = ContactLaw::Johnson { depth_mm: PerContact::default() };
-            let johnson = if matches!(own.law, ContactLaw::Johnson { .. }) { own.law } else { johnson };
-            vec![own.law, ContactLaw::Linear, ContactLaw::Palmgren, johnson]
-        }
-    };
+    let others = ContactLaw::WITHOUT_NUMBERS.into_iter().filter(|law| law.suits(&drive.parameters().tooth));
+    // Other numbers would be another model with the same name.
+    let others = others.map(|law| if law.name() == own.law.name() { own.law } else { law });
+    let laws: Vec<_> = std::iter::once(own.law).chain(others).collect();
     let mut models = vec![*own];
     for compatibility in [Compatibility::Projection, Compatibility::VirtualWork] {
         for &law in &laws {

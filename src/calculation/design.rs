@@ -18,6 +18,7 @@ use crate::json::{self, Fault};
 use crate::no_answer::NoAnswer;
 
 mod asked;
+mod contact_law;
 mod deviations;
 mod drive;
 mod friction;
@@ -29,6 +30,7 @@ mod refinements;
 mod resolved;
 
 pub use asked::*;
+pub use contact_law::*;
 pub use deviations::*;
 pub use drive::*;
 pub use friction::*;

@@ -1,31 +1,5 @@
 //! Forces and contact stresses over one period.
 
-use std::io::{self, Write};
-
-use serde::Serialize;
-use toothwave_solver::backing::{Backings, Shares};
-use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, LossParameters, LossTotals, PointLosses};
-use toothwave_solver::losses::{Mechanism, period};
-use toothwave_solver::ring::FlankEnd;
-use toothwave_solver::sweep::{self as solver, Points};
-use toothwave_solver::{
-    Contact, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings,
-    model_error as error_of_model,
-};
-
-use crate::design::{self, Design, ModelDocument};
-use crate::field::FieldCode;
-use crate::findings::{Causes, FindingAnswer, drive_findings, write_findings};
-use crate::forms::{Form, Format, Forms, csv_error};
-use crate::json::word;
-use crate::key::Encode;
-use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
-use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
-use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
-use crate::sweep::backing::EstimateAnswer;
-use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
-use crate::sweep::losses::{LossesAnswer, RadialForceAnswer, RollsAnswer};
-
 pub mod answer;
 mod arrow;
 pub mod backing;
@@ -35,6 +9,30 @@ pub mod losses;
 mod model_error;
 pub mod peaks_only;
 mod plots;
+mod states;
+mod text;
+
+use toothwave_solver::backing::{Backings, Shares};
+use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, LossParameters, LossTotals, PointLosses};
+use toothwave_solver::losses::{Mechanism, period};
+use toothwave_solver::model_error as error_of_model;
+use toothwave_solver::ring::FlankEnd;
+use toothwave_solver::sweep::{self as solver, Points};
+use toothwave_solver::{Contact, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings};
+
+use crate::design::{self, Design, ModelDocument};
+use crate::field::FieldCode;
+use crate::findings::{Causes, FindingAnswer, drive_findings};
+use crate::forms::{Form, Format, Forms};
+use crate::key::Encode;
+use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
+use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
+use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
+use crate::sweep::backing::EstimateAnswer;
+use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
+use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
+
+pub use states::Column;
 
 /// The checked parameters of a sweep.
 #[derive(Debug)]
@@ -401,29 +399,6 @@ impl DutyAnswer {
     }
 }
 
-/// Column of the states.
-#[derive(Debug, Clone, Copy)]
-pub enum Column<'a> {
-    /// Numbers.
-    Numbers(&'a [f64]),
-    /// Whole numbers.
-    Counts(&'a [u32]),
-    /// Booleans.
-    Flags(&'a [bool]),
-    /// Contacts at which teeth roll.
-    Rolls(&'a [RollsAnswer]),
-}
-
-/// Entry of a column.
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Entry {
-    Number(f64),
-    Count(u32),
-    Flag(bool),
-    Rolls(RollsAnswer),
-}
-
 impl Forms for SweepAnswer {
     const FORMS: &'static [(Format, Form<Self>)] = &[
         (Format::Csv, Self::write_csv),
@@ -446,154 +421,5 @@ impl Forms for SweepAnswer {
         let columns_bytes = self.columns().iter().map(|(_, column)| column.bytes()).sum();
         // A plot sorts the states by position, which needs the same memory again.
         if format == Format::Svg { 2 * columns_bytes } else { columns_bytes }
-    }
-}
-
-impl Column<'_> {
-    /// Returns the approximate length as JSON.
-    const fn text_bytes(&self) -> usize {
-        match self {
-            Self::Numbers(numbers) => NUMBER_TEXT_BYTES * numbers.len(),
-            Self::Counts(counts) => 5 * counts.len(),
-            Self::Flags(flags) => 6 * flags.len(),
-            Self::Rolls(rolls) => 17 * rolls.len(),
-        }
-    }
-
-    const fn entry(&self, state: usize) -> Entry {
-        match self {
-            Self::Numbers(numbers) => Entry::Number(numbers[state]),
-            Self::Counts(counts) => Entry::Count(counts[state]),
-            Self::Flags(flags) => Entry::Flag(flags[state]),
-            Self::Rolls(rolls) => Entry::Rolls(rolls[state]),
-        }
-    }
-
-    const fn bytes(&self) -> u64 {
-        let bytes = match self {
-            Self::Numbers(numbers) => size_of_val(*numbers),
-            Self::Counts(counts) => size_of_val(*counts),
-            Self::Flags(flags) => size_of_val(*flags),
-            Self::Rolls(rolls) => size_of_val(*rolls),
-        };
-        bytes as u64
-    }
-}
-
-impl SweepAnswer {
-    /// Returns the columns of the states with their names in JSON; those of the slips come last.
-    pub fn columns(&self) -> Vec<(&'static str, Column<'_>)> {
-        let states = &self.states;
-        let mut columns = vec![
-            ("input_angle_deg", Column::Numbers(&states.input_angle_deg)),
-            ("tooth", Column::Counts(&states.tooth)),
-            ("position_deg", Column::Numbers(&states.position_deg)),
-            ("center_radius_mm", Column::Numbers(&states.center_radius_mm)),
-            ("wave_generator_angle_deg", Column::Numbers(&states.wave_generator_angle_deg)),
-            ("ring_angle_deg", Column::Numbers(&states.ring_angle_deg)),
-            ("force_wave_generator_n", Column::Numbers(&states.force_wave_generator_n)),
-            ("force_ring_n", Column::Numbers(&states.force_ring_n)),
-            ("force_carrier_n", Column::Numbers(&states.force_carrier_n)),
-            ("stress_wave_generator_mpa", Column::Numbers(&states.stress_wave_generator_mpa)),
-            ("stress_ring_mpa", Column::Numbers(&states.stress_ring_mpa)),
-            ("stress_carrier_mpa", Column::Numbers(&states.stress_carrier_mpa)),
-        ];
-        columns.extend(states.lobe.as_deref().map(|lobe| ("lobe", Column::Counts(lobe))));
-        columns.extend(states.loaded.as_deref().map(|loaded| ("loaded", Column::Flags(loaded))));
-        if let Some(LossesAnswer { slip_mm_per_rad: slip, rolls, .. }) = &self.losses {
-            columns.extend([
-                ("slip_wave_generator_mm_per_rad", Column::Numbers(&slip.wave_generator)),
-                ("slip_ring_mm_per_rad", Column::Numbers(&slip.ring)),
-                ("slip_carrier_mm_per_rad", Column::Numbers(&slip.carrier)),
-                ("rolls", Column::Rolls(rolls)),
-            ]);
-        }
-        columns
-    }
-
-    fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let columns = self.columns();
-        let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record(columns.iter().map(|(name, _)| name)).map_err(csv_error)?;
-        let mut row = Vec::with_capacity(columns.len());
-        for state in 0..self.states.tooth.len() {
-            row.clear();
-            row.extend(columns.iter().map(|(_, column)| column.entry(state)));
-            csv.serialize(&row).map_err(csv_error)?;
-        }
-        csv.flush()
-    }
-
-    fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
-        writeln!(writer, "coincidence degree                  {:.12}", self.coincidence_degree)?;
-        writeln!(writer, "period of the input angle           {:.6} deg", self.period_deg)?;
-        if let Some(sweep_period_deg) = self.sweep_period_deg {
-            writeln!(writer, "input angle of the sweep            {sweep_period_deg:.6} deg")?;
-        }
-        let zones = if self.states.lobe.is_none() { "per zone" } else { "in all zones" };
-        writeln!(writer, "teeth in mesh {zones:<22}{}", self.teeth_in_mesh_per_zone)?;
-        writeln!(writer, "teeth that carry {zones:<19}{}", self.loaded_teeth_per_zone)?;
-        writeln!(writer, "states                              {}", self.states.tooth.len())?;
-        writeln!(writer, "torque balance residual             {:.1e}", self.checks.torque_balance_residual)?;
-        writeln!(writer, "period closure residual             {:.1e}", self.checks.period_closure_residual)?;
-        writeln!(writer, "\npeak                              value   input angle      position")?;
-        let contacts = [
-            ("wave generator", &self.peaks.wave_generator),
-            ("ring", &self.peaks.ring),
-            ("carrier", &self.peaks.carrier),
-        ];
-        for (name, contact) in contacts {
-            for (quantity, unit, peak) in [("force", "N", &contact.force_n), ("stress", "MPa", &contact.stress_mpa)] {
-                writeln!(
-                    writer,
-                    "{name:<14} {quantity:<6} {:>14.3} {unit:<3} {:>9.4} deg {:>9.4} deg",
-                    peak.value, peak.input_angle_deg, peak.position_deg
-                )?;
-            }
-        }
-        if let Some(capacity) = &self.torque_capacity {
-            let limit = if capacity.turns_past_teeth {
-                "beyond it the wave generator turns past its teeth".to_owned()
-            } else {
-                format!("limited by {}", word(&capacity.contact))
-            };
-            writeln!(
-                writer,
-                "\ntorque capacity, input and output   {:.6} and {:.6} N·m, {limit} at {:.4} deg",
-                capacity.input_torque_nm, capacity.output_torque_nm, capacity.input_angle_deg
-            )?;
-        }
-        if let Some(wind_up) = &self.wind_up {
-            let range = |column: &[f64]| {
-                let least = column.iter().copied().fold(f64::INFINITY, f64::min);
-                (least, column.iter().copied().fold(f64::NEG_INFINITY, f64::max))
-            };
-            let (least, most) = range(&wind_up.wind_up_deg);
-            let (softest, stiffest) = range(&wind_up.torsional_stiffness_nm_per_rad);
-            let error_deg = wind_up.transmission_error_peak_to_peak_deg;
-            writeln!(writer, "\nwind-up of the input                {least:.6} to {most:.6} deg")?;
-            if let Some(unloaded_deg) = &wind_up.unloaded_wind_up_deg {
-                let (least, most) = range(unloaded_deg);
-                writeln!(writer, "the same without load               {least:.6} to {most:.6} deg")?;
-            }
-            writeln!(writer, "torsional stiffness at the output   {softest:.6e} to {stiffest:.6e} N·m/rad")?;
-            writeln!(writer, "transmission error, peak to peak    {error_deg:.3e} deg")?;
-            if let Some(error_deg) = wind_up.unloaded_transmission_error_peak_to_peak_deg {
-                writeln!(writer, "the same without load               {error_deg:.3e} deg")?;
-            }
-            if let Some(backlash) = &wind_up.backlash {
-                backlash.write_text(writer)?;
-            }
-        }
-        if let Some(losses) = &self.losses {
-            losses::write_text(&losses.totals, writer)?;
-        }
-        if let Some(radial_force) = &self.radial_force_n {
-            let most_n = radial_force.value.iter().copied().fold(0.0, f64::max);
-            writeln!(writer, "\nlargest force on the wave generator {most_n:.6} N, across its axis")?;
-        }
-        model_error::write_text(&self.model_error, writer)?;
-        backing::write_text(&self.series_compliance_estimates, writer)?;
-        write_findings(&self.findings, writer)
     }
 }

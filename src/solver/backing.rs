@@ -4,7 +4,8 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
+use crate::contact::{Contact, Material, Materials, Part, PerContact};
+use crate::contact_law::ContactLaw;
 use crate::drive::{Draft, Drive, ToothShape};
 use crate::gaps::MM_PER_UM;
 use crate::load_sharing::{LoadCase, LoadParameters};
@@ -235,6 +236,20 @@ pub struct Backings {
 impl Backings {
     /// Returns the compliant parts as manufactured and supported. Only cylinders, with or without flats, load their
     /// parts along a line.
+    ///
+    /// ```
+    /// use toothwave_solver::backing::{Backings, Rim, Support};
+    /// use toothwave_solver::drive::Draft;
+    /// use toothwave_solver::parts::PartsParameters;
+    /// use toothwave_solver::{DriveParameters, LoadParameters};
+    ///
+    /// let draft = Draft::new(&DriveParameters::default()).unwrap();
+    /// let drive = draft.drive().unwrap();
+    /// let support = Support { rim: Some(Rim::Housed), ..Support::default() };
+    /// let backings = Backings::of(&drive, &draft, &PartsParameters::default(), support);
+    /// let mut load = LoadParameters::default();
+    /// load.series_compliance_mm_per_n = backings.series_compliance_mm_per_n(&drive, &load);
+    /// ```
     pub fn of(drive: &Drive, draft: &Draft, parts: &PartsParameters, support: Support) -> Self {
         let mut backings = Self { finger: None, rim: None, housed: None, cam: None, support };
         if matches!(drive.parameters().tooth, ToothShape::Ball { .. }) {
@@ -299,14 +314,11 @@ impl Backings {
     }
 }
 
-/// Returns the depth below a contact that its law includes in the approach: Johnson's own, otherwise the tooth's
+/// Returns the depth below a contact that its law includes in the approach: the law's own, otherwise the tooth's
 /// radius.
 fn counted_depth_mm(drive: &Drive, law: &ContactLaw, contact: Contact) -> f64 {
-    let of_law = match law {
-        ContactLaw::Johnson { depth_mm } => *depth_mm.get(contact),
-        ContactLaw::Linear | ContactLaw::Fixed(_) | ContactLaw::Palmgren | ContactLaw::Hertz => None,
-    };
-    of_law.unwrap_or(drive.parameters().tooth_radius_mm)
+    let tooth_radius_mm = drive.parameters().tooth_radius_mm;
+    law.depth_mm(tooth_radius_mm).map_or(tooth_radius_mm, |depth_mm| *depth_mm.get(contact))
 }
 
 /// Estimates relative to the contact deflection, for line contacts with their own law.
@@ -323,7 +335,7 @@ impl Shares {
     pub fn of(drive: &Drive, load: &LoadCase, backings: &Backings, peaks: &PerContact<ContactPeaks>) -> Option<Self> {
         let p = load.parameters();
         let is_line = matches!(drive.parameters().tooth, ToothShape::Cylinder { .. });
-        if !is_line || !matches!(p.law, ContactLaw::Johnson { .. }) {
+        if !is_line || p.law.depth_mm(drive.parameters().tooth_radius_mm).is_none() {
             return None;
         }
         let cam_force_n = peaks.wave_generator.force_n.value;

@@ -26,6 +26,7 @@ const INTERVALS: usize = 32;
 
 /// Backlash of the carrier over the input angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Backlash {
     /// Mean backlash.
     pub mean_rad: f64,
@@ -72,33 +73,14 @@ fn arcmin(rad: f64) -> f64 {
 /// Returns the backlash of a drive with these deviations and the gaps of this load case. The torque has no effect.
 ///
 /// ```
-/// use toothwave_solver::{backlash, Compatibility, ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Material};
-/// use toothwave_solver::{Materials, Modification, Never, PerContact, ToothShape, Torque, WaveGenerator, parts::CarrierRadii};
+/// use toothwave_solver::{
+///     Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, backlash,
+/// };
 ///
-/// let drive = Drive::new(&DriveParameters {
-///     wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
-///     teeth: 28,
-///     installed: 28,
-///     ring_teeth: 26,
-///     tooth_radius_mm: 5.0,
-///     tooth: ToothShape::Cylinder { width_mm: 15.0 },
-///     tip_radius_mm: None,
-/// })
-/// .unwrap();
-/// let steel = Material::STEEL;
+/// let drive = Drive::new(&DriveParameters::default()).unwrap();
 /// let load = LoadCase::new(&LoadParameters {
-///     materials: Materials { wave_generator: steel, teeth: steel, ring: steel, carrier: steel },
-///     torque: Torque::Input(20.0),
-///     compatibility: Compatibility::VirtualWork,
-///     law: ContactLaw::Palmgren,
-///     series_compliance_mm_per_n: PerContact::default(),
-///     ring_teeth_bend: false,
-///     wave_generator_moves: false,
-///     corner_contact: false,
 ///     clearance_um: PerContact { wave_generator: 10.0, ring: 10.0, carrier: 10.0 },
-///     modification: Modification::NONE,
-///     carrier: CarrierRadii::default(),
-///     allowable_stress_mpa: None,
+///     ..LoadParameters::default()
 /// })
 /// .unwrap();
 /// let backlash = backlash::of(&drive, &load, &Deviations::default(), &Never).unwrap();
@@ -134,7 +116,8 @@ pub fn of(drive: &Drive, load: &LoadCase, deviations: &Deviations, stop: &dyn St
     })
 }
 
-/// Returns the contribution of each contact's gaps to the backlash at an input angle. Their sum is the backlash there.
+/// Returns the contribution of each contact's gaps to the backlash at an input angle. Their sum is the backlash there,
+/// see [`of`].
 ///
 /// # Errors
 /// The errors of [`of`], except interference.

@@ -106,7 +106,7 @@ impl<T> PerContact<T> {
     }
 }
 
-/// An isotropic elastic material.
+/// An isotropic elastic material; by default steel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
     /// Young's modulus E, in GPa.
@@ -125,8 +125,14 @@ impl Material {
     }
 }
 
-/// Materials of all parts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+impl Default for Material {
+    fn default() -> Self {
+        Self::STEEL
+    }
+}
+
+/// Materials of all parts; by default steel.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Materials {
     /// Material of the wave generator.
     pub wave_generator: Material,
@@ -161,54 +167,6 @@ impl Materials {
             Contact::WaveGenerator => &self.wave_generator,
             Contact::Ring => &self.ring,
             Contact::Carrier => &self.carrier,
-        }
-    }
-}
-
-/// Contact law: relation of force and approach of a contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ContactLaw {
-    /// `F = k δ` \[7\] with `k = π L1 E*/2`, of two parallel cylinders in line contact (Yang and Sun 1985).
-    Linear,
-    /// `F = k δ` with given stiffnesses, in N/mm.
-    Fixed(PerContact<f64>),
-    /// Palmgren's `δ = 3.84e-5 F^0.9/L^0.8` (steel on steel, N and mm).
-    Palmgren,
-    /// The logarithmic approach of a cylinder between two bodies (K. L. Johnson, *Contact Mechanics*, 1985, section
-    /// 5.6). Each body is fixed at a depth, by default the tooth's radius.
-    Johnson {
-        /// Depth of each body below its contact, in mm.
-        depth_mm: PerContact<Option<f64>>,
-    },
-    /// Hertz's `δ = q F^(2/3)` of a point contact: the law of balls.
-    Hertz,
-}
-
-/// A contact law by its name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
-pub enum LawName {
-    /// `k = π L1 E*/2`.
-    Linear,
-    /// Given stiffnesses.
-    Fixed,
-    /// Palmgren's.
-    Palmgren,
-    /// Johnson's.
-    Johnson,
-    /// Hertz's.
-    Hertz,
-}
-
-impl ContactLaw {
-    /// Name.
-    pub const fn name(&self) -> LawName {
-        match self {
-            Self::Linear => LawName::Linear,
-            Self::Fixed(_) => LawName::Fixed,
-            Self::Palmgren => LawName::Palmgren,
-            Self::Johnson { .. } => LawName::Johnson,
-            Self::Hertz => LawName::Hertz,
         }
     }
 }

@@ -106,6 +106,19 @@ enum MadePart {
 impl Drawing {
     /// Checks the parameters of the subject.
     ///
+    /// ```
+    /// use toothwave_solver::drawing::{Drawing, DrawingParameters, Subject};
+    /// use toothwave_solver::drive::Draft;
+    /// use toothwave_solver::parts::PartsParameters;
+    /// use toothwave_solver::{DriveParameters, Never};
+    ///
+    /// let draft = Draft::new(&DriveParameters::default()).unwrap();
+    /// let parameters = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 100_000, input_angle_deg: 0.0 };
+    /// let drawing = Drawing::new(&draft, Subject::Assembly, &PartsParameters::default(), &parameters).unwrap();
+    /// let bodies = drawing.bodies(&Never).unwrap();
+    /// assert_eq!(bodies.len(), 4);
+    /// ```
+    ///
     /// # Errors
     /// Every reason why it cannot be made, including those of the drive.
     pub fn new(

@@ -1,24 +1,26 @@
 //! Findings: warnings and information about a drive that can exist (docs/reference/findings.md).
 
-use std::f64::consts::PI;
+mod contacts;
+mod made_parts;
+
+use FindingCode as Code;
 
 use crate::SolveError;
 use crate::backing::{Backing, Estimate, Shares};
 use crate::backlash::Backlash;
 use crate::cam::Hollow;
-use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
+use crate::contact::Contact;
 use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::{Compatibility, LoadCase};
 use crate::losses::{FirstOrderError, Fixed, Friction, MEASURED_TO, MEASURED_TO_ALONG_CAM, Mechanism};
 use crate::mesh::Mesh;
-use crate::parts::{CarrierPart, RingPart, WaveGeneratorPart};
 use crate::ring::FlankEnd;
 use crate::root::NotConverged;
-use crate::sweep::{ContactPeaks, States, Sweep};
-use crate::tooth::line::{WIDE_SHARE, least_length_mm};
-use crate::tooth::plain_approach_mm;
+use crate::sweep::Sweep;
 
-use FindingCode as Code;
+pub(crate) use contacts::widest_half_widths_mm;
+pub use contacts::{of_contacts, of_half_widths};
+pub(crate) use made_parts::{of_carrier, of_ring, of_wave_generator};
 
 /// Contact stress at the fatigue limit of bearing steel (ISO 281:2007).
 pub const FATIGUE_LIMIT_STRESS_MPA: f64 = 1500.0;
@@ -64,8 +66,6 @@ pub const GROOVE_DEPTH_SHARE_OF_BALL: f64 = 0.5;
 
 /// Negative backlash closer to zero than this is rounding.
 const ROUNDING_ARCMIN: f64 = 1e-9;
-
-const STEEL: Material = Material::STEEL;
 
 /// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -178,6 +178,22 @@ impl Finding {
 }
 
 /// Returns the findings about the drive itself.
+///
+/// ```
+/// use toothwave_solver::{Drive, DriveParameters, FindingCode, WaveGenerator, findings};
+///
+/// let undercut = Drive::new(&DriveParameters {
+///     wave_generator: WaveGenerator::Ellipse { semi_major_mm: 50.7, semi_minor_mm: 49.3 },
+///     teeth: 80,
+///     installed: 40,
+///     ring_teeth: 78,
+///     tooth_radius_mm: 1.5,
+///     ..DriveParameters::default()
+/// })
+/// .unwrap();
+/// let found = findings::of_drive(&undercut).unwrap();
+/// assert!(found.iter().any(|finding| finding.code == FindingCode::Undercut));
+/// ```
 ///
 /// # Errors
 /// [`NotConverged`] from the geometry.
@@ -334,175 +350,10 @@ pub fn of_bearing(dynamic_load_rating_n: f64, load_n: f64) -> Option<Finding> {
     (load_n > limit_n).then_some(Finding::warning(Code::BearingLoadAboveHalfRating, load_n, limit_n))
 }
 
-/// Returns the findings about the manufactured ring (docs/explanation/theory.md section 8).
-pub(crate) fn of_ring(drive: &Drive, ring: &RingPart) -> Vec<Finding> {
-    let flank = ring.space.set_back_flank();
-    let thin = thin_wall(drive, Contact::Ring, ring.outer_radius_mm - ring.space.outermost_radius_mm());
-    let mut findings: Vec<_> = thin.into_iter().chain(groove_not_drawn(drive, Contact::Ring)).collect();
-    if ring.space.is_undercut_by_distance()
-        && !drive.flank().is_undercut()
-        && let Some(critical_distance_mm) = flank.critical_distance_mm()
-    {
-        findings.push(Finding::warning(Code::ClearanceUndercutsRing, flank.distance_mm(), critical_distance_mm));
-    }
-    findings
-}
-
-/// Returns the findings about the manufactured wave generator. A solid cam has no wall.
-pub(crate) fn of_wave_generator(drive: &Drive, cam: &WaveGeneratorPart) -> Vec<Finding> {
-    let wall_mm = |bore_mm: f64| drive.flank().locus().cam_inner_radius_mm() - cam.set_back_mm - bore_mm;
-    let thin = cam.bore_radius_mm.and_then(|bore_mm| thin_wall(drive, Contact::WaveGenerator, wall_mm(bore_mm)));
-    thin.into_iter().chain(groove_not_drawn(drive, Contact::WaveGenerator)).collect()
-}
-
-/// Returns the findings about the manufactured carrier: its walls must cover the travel of the teeth's centres.
-///
-/// # Errors
-/// [`NotConverged`] from the geometry.
-pub(crate) fn of_carrier(drive: &Drive, carrier: &CarrierPart) -> Result<Vec<Finding>, NotConverged> {
-    let p = drive.parameters();
-    let w = carrier.slot_half_width_mm;
-    // A wall is at distance w from the slot's middle, so its ends are nearer to the axis along the slot than their
-    // radii.
-    let along_slot_mm = |radius_mm: f64| ((radius_mm - w).max(0.0) * (radius_mm + w)).sqrt();
-    // If slots overlap, the fingers are pointed and their walls begin at the point.
-    let point_mm = w / (PI / p.installed as f64).tan();
-    let (inner_mm, outer_mm) =
-        (along_slot_mm(carrier.inner_radius_mm).max(point_mm), along_slot_mm(carrier.outer_radius_mm));
-    let locus = drive.flank().locus();
-    let innermost_mm = locus.cam_inner_radius_mm() + p.tooth_radius_mm;
-    let outermost_mm = locus.cam_outer_radius_mm() + p.tooth_radius_mm;
-    let innermost_loaded_mm = drive.flank().locus().at(drive.flank_limit().position)?.center_radius_mm;
-    let mut findings = Vec::new();
-    if innermost_mm < inner_mm {
-        let is_loaded = innermost_loaded_mm < inner_mm;
-        let center_radius_mm = if is_loaded { innermost_loaded_mm } else { innermost_mm };
-        findings.push(Finding::grave_if(Code::ToothLeavesSlot, center_radius_mm, inner_mm, is_loaded));
-    }
-    if outermost_mm > outer_mm {
-        findings.push(Finding::warning(Code::ToothLeavesSlot, outermost_mm, outer_mm));
-    }
-    findings.extend(groove_not_drawn(drive, Contact::Carrier));
-    Ok(findings)
-}
-
 /// Returns `r_g` if teeth are balls and this contact has a groove for them.
 const fn groove_radius_mm(drive: &Drive, contact: Contact) -> Option<f64> {
     match &drive.parameters().tooth {
         ToothShape::Ball { groove_radius_mm } => *groove_radius_mm.get(contact),
         ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => None,
     }
-}
-
-/// Returns the finding if there is a groove: outlines are drawn without it.
-fn groove_not_drawn(drive: &Drive, contact: Contact) -> Option<Finding> {
-    let ball_radius_mm = drive.parameters().tooth_radius_mm;
-    let finding = |groove_radius_mm| Finding::info(Code::GrooveNotDrawn, groove_radius_mm, ball_radius_mm).at(contact);
-    groove_radius_mm(drive, contact).map(finding)
-}
-
-/// Returns half the width at the edges of a groove of radius `r_g` and depth `t`: `√(t (2r_g - t))`, at most the ball's
-/// radius.
-fn groove_half_width_mm(groove_radius_mm: f64, ball_radius_mm: f64) -> f64 {
-    let depth_mm = GROOVE_DEPTH_SHARE_OF_BALL * ball_radius_mm;
-    (depth_mm * (2.0 * groove_radius_mm - depth_mm)).sqrt().min(ball_radius_mm)
-}
-
-/// Returns the finding if a wall is thinner than the minimum share of a slot's width, as for walls between slots.
-fn thin_wall(drive: &Drive, contact: Contact, wall_mm: f64) -> Option<Finding> {
-    let limit_mm = THIN_WALL_SHARE_OF_SLOT * 2.0 * drive.slot_half_width_mm();
-    (wall_mm < limit_mm).then_some(Finding::warning(Code::ThinWallAsMade, wall_mm, limit_mm).at(contact))
-}
-
-/// True if the contact is that of a flat.
-fn is_flat(drive: &Drive, contact: Contact) -> bool {
-    contact == Contact::Carrier && matches!(drive.parameters().tooth, ToothShape::FlatSided { .. })
-}
-
-/// Returns the findings about a drive's contacts under a load. `approaches_matter` is true if wind-up or clearance is
-/// computed.
-pub fn of_contacts(
-    drive: &Drive,
-    load: &LoadCase,
-    peaks: &PerContact<ContactPeaks>,
-    approaches_matter: bool,
-) -> Vec<Finding> {
-    let p = load.parameters();
-    let width_mm = drive.tooth_width_mm();
-    let mut findings = Vec::new();
-    let force_n = peaks.wave_generator.force_n.value;
-    let approach_mm = |law: ContactLaw| plain_approach_mm(&law, &p.materials, width_mm, force_n);
-    if p.law == ContactLaw::Linear
-        && approaches_matter
-        && let Some((linear_mm, palmgren_mm)) = approach_mm(ContactLaw::Linear).zip(approach_mm(ContactLaw::Palmgren))
-    {
-        findings.push(Finding::info(Code::LinearLawTooStiff, 1e3 * linear_mm, 1e3 * palmgren_mm));
-    }
-    if p.law == ContactLaw::Palmgren {
-        let steel = Materials { wave_generator: STEEL, teeth: STEEL, ring: STEEL, carrier: STEEL };
-        let steel_mpa = steel.contact_modulus_mpa(Contact::Ring);
-        // A flat has its own law, which depends on the modulus.
-        for (contact, _) in peaks.iter().filter(|&(contact, _)| !is_flat(drive, contact)) {
-            let contact_mpa = p.materials.contact_modulus_mpa(contact);
-            if (contact_mpa / steel_mpa - 1.0).abs() > STEEL_TOLERANCE {
-                let (contact_gpa, steel_gpa) = (1e-3 * contact_mpa, 1e-3 * steel_mpa);
-                findings.push(Finding::warning(Code::PalmgrenBeyondSteel, contact_gpa, steel_gpa).at(contact));
-            }
-        }
-    }
-    for (contact, peaks) in peaks.iter() {
-        if let Some(half_length_mm) = peaks.half_length_mm
-            && let Some(groove_radius_mm) = groove_radius_mm(drive, contact)
-        {
-            let limit_mm = groove_half_width_mm(groove_radius_mm, drive.parameters().tooth_radius_mm);
-            if half_length_mm > limit_mm {
-                findings.push(Finding::warning(Code::ContactBeyondGroove, half_length_mm, limit_mm).at(contact));
-            }
-        }
-    }
-    if let Some(allowable_mpa) = &p.allowable_stress_mpa {
-        findings.extend(
-            peaks
-                .iter()
-                .map(|(contact, peaks)| (contact, peaks.stress_mpa.value, *allowable_mpa.get(contact)))
-                // The fatigue limit has its own finding.
-                .filter(|(_, stress_mpa, allowable_mpa)| {
-                    stress_mpa > allowable_mpa && allowable_mpa.total_cmp(&FATIGUE_LIMIT_STRESS_MPA).is_ne()
-                })
-                .map(|(contact, stress_mpa, allowable_mpa)| {
-                    Finding::warning(Code::StressAboveAllowable, stress_mpa, allowable_mpa).at(contact)
-                }),
-        );
-    }
-    let stresses = peaks.iter().map(|(contact, peaks)| (contact, peaks.stress_mpa.value));
-    let tired = stresses.filter(|(_, stress_mpa)| *stress_mpa > FATIGUE_LIMIT_STRESS_MPA);
-    findings.extend(tired.map(|(contact, stress_mpa)| {
-        Finding::warning(Code::StressAboveFatigueLimit, stress_mpa, FATIGUE_LIMIT_STRESS_MPA).at(contact)
-    }));
-    findings
-}
-
-/// Returns half the width of the widest contact of each kind over all states. It is not the contact with the largest
-/// stress. Flats have none.
-pub(crate) fn widest_half_widths_mm(drive: &Drive, states: &States) -> impl Iterator<Item = (Contact, f64)> {
-    let tooth_width_mm = drive.tooth_width_mm();
-    states.force_n.iter().filter(|&(contact, _)| !is_flat(drive, contact)).map(move |(contact, forces_n)| {
-        // A corner has no such width, and its stress is not reported.
-        let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(_, &stress_mpa)| stress_mpa > 0.0);
-        let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));
-        (contact, half_widths.fold(0.0, f64::max))
-    })
-}
-
-/// Returns the contacts that are too wide for Johnson's law, over all states.
-pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
-    let ContactLaw::Johnson { depth_mm } = &load.parameters().law else { return Vec::new() };
-    let tooth_radius_mm = drive.parameters().tooth_radius_mm;
-    widest_half_widths_mm(drive, states)
-        .map(|(contact, half_width_mm)| {
-            let limit_mm = WIDE_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm);
-            Finding::warning(Code::JohnsonBeyondHalfWidth, half_width_mm, limit_mm).at(contact)
-        })
-        .filter(|finding| finding.value > finding.limit)
-        .collect()
 }

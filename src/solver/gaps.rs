@@ -351,7 +351,6 @@ impl<'a> Gaps<'a> {
         self.deviations.is_none() && self.modification.first().is_none()
     }
 
-    /// Returns the clearance of each contact.
     pub(crate) const fn clearance_mm(&self) -> &PerContact<f64> {
         &self.clearance_mm
     }

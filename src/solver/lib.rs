@@ -30,14 +30,47 @@
 //! # Usage
 //!
 //! [`Drive::new`] checks the parameters once and reports every reason why a drive cannot exist. A [`Drive`] computes
-//! its geometry and its mesh. With a [`LoadCase`] it computes a [`sweep()`](sweep::sweep) over one period.
+//! its geometry and its mesh. With a [`LoadCase`] it computes a [`sweep()`](sweep::sweep) over one period:
+//!
+//! ```
+//! use toothwave_solver::sweep::{Points, sweep};
+//! use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never, ToothShape, Torque, WaveGenerator};
+//!
+//! let drive = Drive::new(&DriveParameters {
+//!     wave_generator: WaveGenerator::Ellipse { semi_major_mm: 58.0, semi_minor_mm: 56.0 },
+//!     teeth: 28,
+//!     installed: 28,
+//!     ring_teeth: 26,
+//!     tooth_radius_mm: 5.0,
+//!     tooth: ToothShape::Cylinder { width_mm: 15.0 },
+//!     tip_radius_mm: None,
+//! })
+//! .unwrap();
+//! let load = LoadCase::new(&LoadParameters { torque: Torque::Output(280.0), ..LoadParameters::default() }).unwrap();
+//! let sweep = sweep(&drive, &load, Points::samples(200).unwrap(), &Never).unwrap();
+//! let peak = sweep.peaks.wave_generator.stress_mpa;
+//! assert_eq!(format!("{:.0} MPa", peak.value), "? MPa");
+//! ```
+//!
+//! | to compute | use |
+//! |---|---|
+//! | forces, stresses, wind-up, stiffness, torque capacity | [`sweep()`](sweep::sweep), only their peaks [`sweep::peaks`] |
+//! | the same with deviations of single items | [`sweep::sweep_with_deviations`] |
+//! | true extremes instead of samples | [`sweep::Points::tolerance`] |
+//! | backlash | [`backlash::of`] |
+//! | losses, wear, duty, life of the bearing | [`losses::period::Losses::of`], [`losses::duty::DutySweep`] |
+//! | compliance behind the contacts | [`backing::Backings`] |
+//! | profiles and drawings | [`profile::profiles`], [`drawing::Drawing`] |
+//! | warnings, expected error of the model | [`findings`], [`model_error::of`] |
 
+#[doc(hidden)]
 pub mod approach;
 mod arcs;
 pub mod backing;
 pub mod backlash;
 pub mod cam;
 pub mod contact;
+pub mod contact_law;
 pub mod drawing;
 pub mod drive;
 pub mod findings;
@@ -52,17 +85,21 @@ pub mod parts;
 pub mod position;
 pub mod profile;
 pub mod ring;
+#[doc(hidden)]
 pub mod ring_bending;
 pub mod root;
 mod spline;
+#[doc(hidden)]
 pub mod springs;
 pub mod sweep;
+#[doc(hidden)]
 pub mod tooth;
 mod tooth_space;
 pub mod violation;
 
 pub use cam::WaveGenerator;
-pub use contact::{Contact, ContactLaw, LawName, Material, Materials, Part, PerContact};
+pub use contact::{Contact, Material, Materials, Part, PerContact};
+pub use contact_law::{ContactLaw, LawName};
 pub use drive::{Drive, DriveParameters, ToothShape};
 pub use findings::{Finding, FindingCode, Severity};
 pub use gaps::{Deviations, Modification};

@@ -1,5 +1,7 @@
 //! Mesh: the teeth that carry load at an input angle (docs/explanation/theory.md section 3).
 
+mod place;
+
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
@@ -7,6 +9,9 @@ use crate::drive::Drive;
 use crate::position::Position;
 use crate::ring::{FlankEnd, FlankLimit};
 use crate::violation::{Parameter, Violation};
+
+pub(crate) use place::Neighbours;
+pub use place::{Place, PlacedTooth, TeethInMesh};
 
 /// Number of equal intervals of one period, within its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,76 +58,6 @@ pub struct Mesh {
     told_apart: Option<u64>,
 }
 
-/// Numbers of teeth over the input angle: of one zone if the zones are alike, otherwise and with `deviations` of all
-/// zones.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
-pub struct TeethInMesh {
-    /// Least number.
-    pub min: u64,
-    /// Largest number.
-    pub max: u64,
-}
-
-impl std::fmt::Display for TeethInMesh {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { min, max } = self;
-        if min == max { write!(f, "{min}") } else { write!(f, "{min} to {max}") }
-    }
-}
-
-impl TeethInMesh {
-    /// Returns the numbers for this many teeth at each place.
-    pub(crate) const fn times(self, at_each_place: u64) -> Self {
-        Self { min: at_each_place * self.min, max: at_each_place * self.max }
-    }
-}
-
-/// Place of a tooth among the items of the parts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Place {
-    /// Slot of the carrier, counted from 0.
-    pub slot: u64,
-    /// Tooth space of the ring.
-    pub ring_space: u64,
-    /// Lobe of the wave generator that pushes the tooth.
-    pub lobe: u64,
-}
-
-impl Place {
-    /// Returns the place of the tooth that started `slot` slots from lobe 0 and is pushed by the lobe with this number,
-    /// counted backwards. The ring space is `l = m i - s u`, modulo the ring's teeth.
-    pub fn new(drive: &Drive, slot: u64, lobe: u64) -> Self {
-        Mesh::new(drive).place(slot, lobe)
-    }
-}
-
-/// Teeth in neighbouring slots on one lobe. The distance of their places is the number of laps in a load period.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Neighbours {
-    /// Slot of the first tooth, counted on over turns of the carrier.
-    pub(crate) first_slot: u64,
-    pub(crate) count: u64,
-    /// Place of the first tooth.
-    pub(crate) first_place: u64,
-    pub(crate) lobe: u64,
-}
-
-/// A tooth in mesh at an input angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlacedTooth {
-    /// Slot of the tooth. If zones are alike, the slots of one zone are counted on.
-    pub number: u64,
-    /// Lobe of the tooth, counted from the one at tooth 0 at the start.
-    pub lobe: u32,
-    /// Place among the items that may deviate.
-    pub place: Place,
-    /// Position on the lobe.
-    pub position: Position,
-    /// Position in degrees, rounded once if it is a whole fraction of a turn.
-    pub position_deg: f64,
-}
-
 pub(crate) const fn greatest_common_divisor(one: u64, other: u64) -> u64 {
     let (mut a, mut b) = (one, other);
     while b > 0 {
@@ -133,6 +68,14 @@ pub(crate) const fn greatest_common_divisor(one: u64, other: u64) -> u64 {
 
 impl Mesh {
     /// Returns the mesh of a drive whose items are all alike.
+    ///
+    /// ```
+    /// use toothwave_solver::mesh::Mesh;
+    /// use toothwave_solver::{Drive, DriveParameters};
+    ///
+    /// let mesh = Mesh::new(&Drive::new(&DriveParameters::default()).unwrap());
+    /// println!("contact ratio {:.2}, {} teeth of a lobe", mesh.coincidence_degree(), mesh.teeth_in_mesh());
+    /// ```
     pub fn new(drive: &Drive) -> Self {
         let p = drive.parameters();
         // Counts of a checked drive are positive and small.
@@ -165,7 +108,6 @@ impl Mesh {
         Self { listed_spacings: 0.5 * self.installed as f64 / self.teeth_at_each_place(), ..self }
     }
 
-    /// Returns true if teeth before the flank are listed.
     pub(crate) fn lists_teeth_before_flank(&self) -> bool {
         self.listed_spacings > self.engaged_spacings
     }

@@ -6,7 +6,8 @@ mod measured;
 use measured::MEASURED;
 
 use crate::backing::{Backing, Fingers, Rim, Shares, Support};
-use crate::contact::{Contact, ContactLaw, LawName, Material, PerContact};
+use crate::contact::{Contact, Material};
+use crate::contact_law::{ContactLaw, LawName, WIDE_SHARE};
 use crate::drive::{Drive, ToothShape};
 use crate::findings::{SOFT_BACKING_SHARE, WIND_UP_SHARE_OF_PERIOD, WIND_UP_TIMES_LOBES_RAD, widest_half_widths_mm};
 use crate::gaps::Deviations;
@@ -15,7 +16,6 @@ use crate::mesh::Mesh;
 use crate::ring::FlankEnd;
 use crate::root::NotConverged;
 use crate::sweep::Sweep;
-use crate::tooth::line::{WIDE_SHARE, least_length_mm};
 
 /// Largest number of wave generator lobes in the finite-element comparison.
 pub const LOBES_TO: u32 = 2;
@@ -251,20 +251,17 @@ impl MeasuredRange {
         };
         let by_lobes_deg = (to.times_lobes_rad / f64::from(drive.lobes())).to_degrees();
         // The law's own limit may be lower.
-        let of_law = match law {
-            ContactLaw::Johnson { depth_mm } => PerContact::of(|contact| {
-                WIDE_SHARE * least_length_mm(depth_mm, contact, tooth_radius_mm) / tooth_radius_mm
-            }),
-            _ => PerContact::of(|_| f64::INFINITY),
-        };
+        let of_law = law.reference_length_mm(tooth_radius_mm).map_or(f64::INFINITY, |length_mm| {
+            length_mm
+                .iter()
+                .fold(f64::INFINITY, |least, (_, &length_mm)| least.min(WIDE_SHARE * length_mm / tooth_radius_mm))
+        });
         Self {
             lobes: LOBES_TO,
             pressure_angle_deg: PRESSURE_ANGLE_TO_DEG,
             gap_um: GAP_TO_UM.min(1e3 * GAP_SHARE_TO * tooth_radius_mm),
             wind_up_deg: by_lobes_deg.min(to.share_of_period * Mesh::new(drive).period_deg()),
-            half_width_over_tooth_radius: of_law
-                .iter()
-                .fold(HALF_WIDTH_SHARE_TO, |least, (_, &share)| least.min(share)),
+            half_width_over_tooth_radius: HALF_WIDTH_SHARE_TO.min(of_law),
         }
     }
 }
@@ -273,6 +270,7 @@ impl MeasuredRange {
 /// elements, in drives of the same case (docs/explanation/validation.md).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+#[non_exhaustive]
 pub struct ModelError {
     /// Errors of the case; left out if the law was not measured.
     #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
@@ -331,6 +329,18 @@ pub fn case_of(drive: &Drive, load: &LoadCase, deviations: &Deviations) -> Case 
 }
 
 /// Returns the expected model error for this drive, load and sweep, with parts of this support and these shares.
+///
+/// ```
+/// use toothwave_solver::sweep::{Points, sweep};
+/// use toothwave_solver::{Deviations, model_error};
+/// # use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never};
+/// let drive = Drive::new(&DriveParameters::default()).unwrap();
+/// let load = LoadCase::new(&LoadParameters::default()).unwrap();
+///
+/// let sweep = sweep(&drive, &load, Points::samples(100).unwrap(), &Never).unwrap();
+/// let error = model_error::of(&drive, &load, &Deviations::default(), &sweep, None).unwrap();
+/// assert!(error.measured.is_some());
+/// ```
 ///
 /// # Errors
 /// [`NotConverged`] from the geometry.

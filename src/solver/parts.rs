@@ -323,7 +323,6 @@ impl ToothPart {
 struct Checks(Vec<Violation>);
 
 impl Checks {
-    /// Returns the value if it is in its range.
     fn in_range(&mut self, parameter: Parameter, value: f64) -> Option<f64> {
         let violation = parameter.check(value);
         self.0.extend(violation);

@@ -37,6 +37,7 @@ pub struct ProfileParameters {
 
 /// Profiles of the mating parts.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Profiles {
     /// The ring, in its own frame.
     pub ring: Polyline,
@@ -86,6 +87,16 @@ const PIECES: u32 = 16;
 const MAX_DEPTH: u32 = 40;
 
 /// Returns the profiles of a drive.
+///
+/// ```
+/// use toothwave_solver::profile::{Extent, ProfileParameters, profiles};
+/// # use toothwave_solver::{Drive, DriveParameters, Never};
+/// let drive = Drive::new(&DriveParameters::default()).unwrap();
+///
+/// let parameters = ProfileParameters { chord_tolerance_mm: 1e-3, extent: Extent::Full, max_points: 100_000 };
+/// let ring = profiles(&drive, &parameters, &Never).unwrap().ring;
+/// assert_eq!(ring.first(), ring.last());
+/// ```
 ///
 /// # Errors
 /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.

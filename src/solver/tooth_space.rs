@@ -161,7 +161,6 @@ impl ToothSpace {
         }
     }
 
-    /// Returns one half of it.
     pub(crate) fn half(&self, density: Density, stop: &dyn Stop) -> Result<HalfSpace, SolveError> {
         let Some(ShapedSpace { flank, start, end, .. }) = &self.shaped else {
             let pieces = vec![flank_curve(&self.set_back.flank, &self.set_back.limit, density, stop)?];

@@ -1,33 +1,34 @@
 //! The engine of studies: pure chunks, and a merge that does not depend on their order.
 
-use std::collections::HashSet;
-use std::ops::Range;
-use std::sync::Arc;
+mod requirements;
+mod work;
 
+use std::ops::Range;
+
+use requirements::{
+    asked_quantities, check, is_of_every_draw, require_each_field_once, require_possible_base, require_possible_ranges,
+    require_what_quantities_need,
+};
 use serde::{Deserialize, Serialize};
-use toothwave_calculation::coincidence_degree::CoincidenceDegree;
-use toothwave_calculation::design::Design;
-use toothwave_calculation::field::{FieldCode, FieldError};
-use toothwave_calculation::json::{self, Fault, Tree, path};
+use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
-use toothwave_calculation::question::{self, Question as _};
-use toothwave_calculation::sweep::Sweep;
-use toothwave_solver::Stop;
+use toothwave_calculation::{json, question};
 
-use crate::ask::{all_named, beyond, fault};
+use crate::ask::beyond;
 use crate::document::StudyDocument;
-use crate::evaluate::{Evaluator, Stopped};
-use crate::identity;
-use crate::limit;
+use crate::evaluate::Evaluator;
 use crate::map::Map;
-use crate::quantity::{Needs, QUANTITIES, Quantity};
-use crate::rows::{Rows, RowsPart, RowsWork};
-use crate::search::{Island, IslandPart, Search, SearchAnswer};
+use crate::quantity::Quantity;
+use crate::rows::{Rows, RowsPart};
+use crate::search::{IslandPart, Search, SearchAnswer};
 use crate::sensitivity::Sensitivity;
 use crate::table::Table;
 use crate::tolerance::Tolerance;
-use crate::variant::{Domain, Template, Variable};
+use crate::variant::Template;
+use crate::{identity, limit};
+
+pub use work::Work;
 
 /// Limits of studies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -364,273 +365,4 @@ fn chunk_variants(variants: u64) -> u64 {
     /// The list of chunks stays short enough for its readers.
     const MOST_CHUNKS: u64 = 100_000;
     variants.div_ceil(LEAST_CHUNKS).clamp(1, MOST_VARIANTS).max(variants.div_ceil(MOST_CHUNKS))
-}
-
-/// Checks that no object has a field twice. Otherwise one of two ranges or limits with the same name would be dropped
-/// silently.
-fn require_each_field_once(tree: &Tree) -> Result<(), Fault> {
-    match tree {
-        Tree::Object(fields) => {
-            let mut names = HashSet::new();
-            for (name, value) in fields {
-                if !names.insert(name) {
-                    let detail = format!("the field `{name}` is given twice. Remove one");
-                    return Err(Fault::of_field(FieldCode::DuplicateField, name, detail));
-                }
-                require_each_field_once(value).map_err(|found| found.within(name))?;
-            }
-            Ok(())
-        }
-        Tree::Array(items) => {
-            let mut items = items.iter().enumerate();
-            items.try_for_each(|(index, item)| {
-                require_each_field_once(item).map_err(|found| found.within(&index.to_string()))
-            })
-        }
-        Tree::Null | Tree::Bool(_) | Tree::Number(_) | Tree::Text(_) => Ok(()),
-    }
-}
-
-/// Returns the quantities with these names. Without names, returns all quantities for which every document has the
-/// required fields.
-fn asked_quantities(names: &[String], template: &Template) -> Result<Vec<&'static Quantity>, NoAnswer> {
-    if names.is_empty() {
-        let has = template.examples().map(what_it_has).min().unwrap_or(Needs::Drive);
-        let known = template.examples().all(has_allowable_stress);
-        let is_had = |quantity: &&Quantity| match quantity.needs {
-            Needs::AllowableStress => known,
-            needs => needs <= has,
-        };
-        return Ok(QUANTITIES.iter().filter(is_had).collect());
-    }
-    all_named(names)
-}
-
-fn at<'a>(tree: &'a Tree, place: &[&str]) -> Option<&'a Tree> {
-    let place: Vec<_> = place.iter().map(|&name| name.to_owned()).collect();
-    tree.at(&place)
-}
-
-fn has_allowable_stress(tree: &Tree) -> bool {
-    at(tree, &["load", "allowable_stress_mpa"]).is_some()
-}
-
-/// True if the document sets the speed of the wave generator. Every point of a duty does.
-fn has_speed(tree: &Tree) -> bool {
-    [["load", "input_speed_rpm"], ["load", "duty"]].iter().any(|place| at(tree, place).is_some())
-}
-
-/// Returns the highest need that the document meets, without allowable stresses.
-fn what_it_has(tree: &Tree) -> Needs {
-    let has = |place: &[&str]| at(tree, place).is_some();
-    match (has(&["load"]), has(&["friction"]), has_speed(tree)) {
-        (false, ..) => Needs::Drive,
-        (true, false, _) => Needs::Load,
-        (true, true, false) => Needs::Friction,
-        (true, true, true) => Needs::FrictionAndSpeed,
-    }
-}
-
-/// Checks that a document has the fields that its quantities need.
-fn require_what_quantities_need(quantities: &[&'static Quantity], tree: &Tree) -> Result<(), NoAnswer> {
-    for quantity in quantities {
-        let needed: &[(&[&str], &str)] = match quantity.needs {
-            Needs::Drive => &[],
-            Needs::Load => &[(&["load"], "a load")],
-            Needs::AllowableStress => {
-                &[(&["load"], "a load"), (&["load", "allowable_stress_mpa"], "an allowable stress")]
-            }
-            Needs::Friction => &[(&["load"], "a load"), (&["friction"], "friction")],
-            Needs::FrictionAndSpeed if has_speed(tree) => &[(&["friction"], "friction")],
-            Needs::FrictionAndSpeed => &[
-                (&["load"], "a load"),
-                (&["friction"], "friction"),
-                (&["load", "input_speed_rpm"], "the speed of the wave generator"),
-            ],
-        };
-        if let Some((place, what)) = needed.iter().find(|(place, _)| at(tree, place).is_none()) {
-            let detail = format!("`{}` needs {what}, but the base has none. Add it", quantity.name);
-            return Err(fault(&format!("/base/{}", place.join("/")), FieldCode::MissingField, detail));
-        }
-    }
-    Ok(())
-}
-
-/// Checks a document without computing it.
-fn check(quantities: &[&'static Quantity], document: &Tree, limits: &question::Limits) -> Result<(), NoAnswer> {
-    let design = document.read::<Design>()?.normalised();
-    if quantities.iter().all(|quantity| quantity.needs == Needs::Drive) {
-        CoincidenceDegree.check(&design, limits).map(|_| ())
-    } else {
-        Sweep.check(&design, limits).map(|_| ())
-    }
-}
-
-/// True if no random drive can have an answer, for any amount of deviation.
-fn is_of_every_draw(refused: &NoAnswer) -> bool {
-    refused.code == NoAnswerCode::TooManyStates
-        || refused.errors.iter().any(|error| error.code == FieldCode::ConflictingFields)
-}
-
-/// Checks that every range of a free number overlaps the allowed range of its field.
-fn require_possible_ranges(
-    quantities: &[&'static Quantity],
-    template: &Template,
-    limits: &question::Limits,
-) -> Result<(), NoAnswer> {
-    let errors_of =
-        |example: &Tree| check(quantities, example, limits).err().map_or_else(Vec::new, |refused| refused.errors);
-    // A range is impossible if its largest value is too small or its smallest value too large.
-    for (end, is_below) in [("max", true), ("min", false)] {
-        let value = |variable: &Variable| match variable.domain {
-            Domain::Real { min, max } | Domain::Whole { min, max } => Some(if is_below { max } else { min }),
-            Domain::OneOf(_) => None,
-        };
-        let is_outside = |error: &FieldError, pointer: &str, value: f64| {
-            error.pointer == pointer
-                && error.code == FieldCode::OutOfRange
-                && error.limit.is_some_and(|limit| (value < limit) == is_below)
-        };
-        // All variables at once, because there may be thousands. Then each reported one alone.
-        for example in template.examples_at(value) {
-            for error in errors_of(&example) {
-                let free = template.variables().iter().enumerate();
-                let mut free = free.filter(|(_, variable)| variable.pointer == error.pointer);
-                let Some((index, variable)) = free.next() else { continue };
-                let Some(value) = value(variable).filter(|&value| is_outside(&error, &variable.pointer, value)) else {
-                    continue;
-                };
-                let Some(alone) = template.example_at(index, value) else { continue };
-                let errors = errors_of(&alone);
-                let found = errors.iter().find(|error| is_outside(error, &variable.pointer, value));
-                if let Some(FieldError { detail, limit, .. }) = found
-                    && !OF_THE_DRIVE.contains(&variable.pointer.as_str())
-                {
-                    let at = format!("{}/{end}", template.blamed(&variable.pointer));
-                    return Err(beyond(&at, FieldCode::OutOfRange, detail, value, limit.unwrap_or(value)));
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Checks that a document has the right form for all values, and that the base's own numbers are in range.
-fn require_possible_base(
-    quantities: &[&'static Quantity],
-    template: &Template,
-    example: &Tree,
-    limits: &question::Limits,
-) -> Result<(), NoAnswer> {
-    let Err(mut refused) = check(quantities, example, limits) else { return Ok(()) };
-    if refused.code != NoAnswerCode::InvalidDocument {
-        refused.errors.retain(|error| is_of_base(template, example, error));
-        let Some(error) = refused.errors.first() else { return Ok(()) };
-        refused.detail = format!("{}: {}", error.pointer, error.detail);
-    }
-    for error in &mut refused.errors {
-        let blamed = template.blamed(&error.pointer);
-        refused.detail = refused.detail.replacen(&error.pointer, &blamed, 1);
-        error.pointer = blamed;
-    }
-    Err(refused)
-}
-
-/// Field whose range depends on the rest of the drive.
-const OF_THE_DRIVE: [&str; 1] = ["/modification/ring_tip_relief/start_deg"];
-
-/// True if every variant has this error: a value out of range, or values that contradict each other.
-fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
-    let stands = path(&error.pointer).and_then(|path| example.at(&path));
-    match error.code {
-        FieldCode::OutOfRange => match stands {
-            Some(Tree::Number(_)) => {
-                !template.is_varied(&error.pointer) && !OF_THE_DRIVE.contains(&error.pointer.as_str())
-            }
-            // For a list the error is about its sum or its length.
-            Some(Tree::Array(_)) => !template.varies_within(&[&error.pointer]),
-            _ => false,
-        },
-        FieldCode::ConflictingFields => !template.varies_within(&[
-            "/drive",
-            "/load",
-            "/model",
-            "/modification",
-            "/deviations",
-            "/friction",
-            "/parts",
-        ]),
-        FieldCode::WrongLength => !template.varies_within(&["/drive", "/deviations"]),
-        FieldCode::CamNotElongated => !template.varies_within(&["/drive/wave_generator"]),
-        FieldCode::InstalledNoDivisor | FieldCode::GrooveTooTight | FieldCode::FlatTooLong => {
-            !template.varies_within(&["/drive/teeth"])
-        }
-        FieldCode::CamTooSmall
-        | FieldCode::ToothDifference
-        | FieldCode::TeethTouch
-        | FieldCode::NoCarrierAnnulus
-        | FieldCode::BoreLeavesNoFlank => !template.varies_within(&["/drive"]),
-        _ => false,
-    }
-}
-
-/// A chunk that is being computed, one variant a step. It can be paused between two steps.
-#[derive(Debug)]
-pub struct Work {
-    study: Arc<Study>,
-    state: State,
-}
-
-#[derive(Debug)]
-enum State {
-    Rows(RowsWork),
-    Island(Box<Island>),
-}
-
-impl Work {
-    /// Starts a chunk of a study.
-    pub fn new(study: &Arc<Study>, chunk: u64) -> Self {
-        let state = match &study.kind {
-            Kind::Search(search) => State::Island(Box::new(Island::new(search, study.template.clone(), chunk))),
-            Kind::Map(_) | Kind::Sensitivity(_) | Kind::Tolerance(_) => {
-                let quantities = study.evaluator.quantities.len();
-                State::Rows(RowsWork::new(study.template.clone(), quantities, study.span_of(chunk)))
-            }
-        };
-        Self { study: Arc::clone(study), state }
-    }
-
-    /// Computes one variant. Returns true if it was the last one.
-    ///
-    /// # Errors
-    /// If `stop` is set. The chunk is then the same as before.
-    pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Stopped> {
-        let Self { study, state } = self;
-        let evaluator = &study.evaluator;
-        match (&study.kind, state) {
-            (Kind::Map(map), State::Rows(rows)) => rows.step(map, evaluator, stop),
-            (Kind::Sensitivity(sensitivity), State::Rows(rows)) => rows.step(sensitivity, evaluator, stop),
-            (Kind::Tolerance(tolerance), State::Rows(rows)) => rows.step(tolerance, evaluator, stop),
-            (Kind::Search(search), State::Island(island)) => island.step(search, evaluator, stop),
-            // `new` never makes this combination.
-            (Kind::Search(_), State::Rows(_)) | (_, State::Island(_)) => Ok(true),
-        }
-    }
-
-    /// Returns the result of a finished chunk.
-    pub fn finish(self) -> Part {
-        match self.state {
-            State::Rows(rows) => Part::Rows(rows.finish()),
-            State::Island(island) => Part::Island(island.finish()),
-        }
-    }
-
-    /// Computes the whole chunk.
-    ///
-    /// # Errors
-    /// The same as [`Self::step`].
-    pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Stopped> {
-        while !self.step(stop)? {}
-        Ok(self.finish())
-    }
 }

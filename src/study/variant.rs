@@ -1,14 +1,20 @@
 //! Variants of a document: its free fields, their ranges, and the document with values filled in.
 
+mod form;
+mod variable;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use form::{Form, is_within};
 use toothwave_calculation::design::Design;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::json::{Fault, Tree, path};
 use toothwave_calculation::no_answer::NoAnswer;
 
 use crate::ask::{beyond, escaped, fault};
+
+pub(crate) use variable::{Asked, Domain, Value, Variable};
 
 /// Most combinations of choices. Each is a stored document.
 const MOST_FORMS: usize = 256;
@@ -28,51 +34,6 @@ const OWN_BYTES: usize = 1 << 18;
 
 const RING_TEETH: [&str; 3] = ["drive", "ring", "teeth"];
 
-/// Range of values of a free field.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Domain {
-    /// Any number of a range, both ends included.
-    Real {
-        /// Smallest value.
-        min: f64,
-        /// Largest value.
-        max: f64,
-    },
-    /// Any whole number of a range, both ends included.
-    Whole {
-        /// Smallest value.
-        min: f64,
-        /// Largest value.
-        max: f64,
-    },
-    /// One of this many choices.
-    OneOf(usize),
-}
-
-/// A free field.
-#[derive(Debug, Clone)]
-pub(crate) struct Variable {
-    pub(crate) pointer: String,
-    path: Vec<String>,
-    pub(crate) domain: Domain,
-    choices: Vec<Tree>,
-}
-
-/// Requested values of a free field: a range or a list.
-#[derive(Debug, Clone)]
-pub(crate) enum Asked {
-    Range { min: f64, max: f64 },
-    OneOf(Vec<Tree>),
-}
-
-/// The value of a free field in one variant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Value {
-    Number(f64),
-    /// Index of the choice.
-    Choice(usize),
-}
-
 /// Documents with free fields, one for each combination of choices. Clones share those that they have not filled.
 #[derive(Debug, Clone)]
 pub(crate) struct Template {
@@ -82,14 +43,6 @@ pub(crate) struct Template {
     forms: Arc<Vec<Form>>,
     /// Private copies of shared forms, by index.
     own: BTreeMap<usize, Form>,
-}
-
-#[derive(Debug, Clone)]
-struct Form {
-    tree: Tree,
-    /// For each variable, true if this form has it.
-    takes: Vec<bool>,
-    derives_ring_teeth: bool,
 }
 
 fn too_many_forms(list: &str) -> NoAnswer {
@@ -464,108 +417,6 @@ impl Template {
         self.own.clear();
         for form in Arc::make_mut(&mut self.forms) {
             form.tree.remove(place);
-        }
-    }
-}
-
-/// True if a pointer is at a place or within it.
-fn is_within(pointer: &str, place: &str) -> bool {
-    pointer.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
-}
-
-impl Form {
-    /// Sets the ring's teeth if the base has none: the number of teeth minus the number of lobes.
-    fn derive(&mut self) {
-        if !self.derives_ring_teeth {
-            return;
-        }
-        let number = |place: &[&str]| {
-            let place: Vec<_> = place.iter().map(|&name| name.to_owned()).collect();
-            match self.tree.at(&place) {
-                Some(Tree::Number(number)) => Some(*number),
-                _ => None,
-            }
-        };
-        let kind = self.tree.at(&["drive", "wave_generator", "kind"].map(String::from));
-        let lobes = match kind {
-            Some(Tree::Text(kind)) if kind == "eccentric" => Some(1.0),
-            Some(Tree::Text(kind)) if kind == "ellipse" => Some(2.0),
-            Some(_) => number(&["drive", "wave_generator", "lobes"]),
-            None => Some(2.0),
-        };
-        if let (Some(lobes), Some(count)) = (lobes, number(&["drive", "teeth", "count"])) {
-            self.tree.set(&RING_TEETH.map(String::from), Tree::Number(count - lobes));
-        }
-    }
-
-    /// Sets every free number to its smallest value.
-    fn put_least(&mut self, variables: &[Variable]) {
-        for (variable, _) in variables.iter().zip(&self.takes).filter(|(_, takes)| **takes) {
-            if let Domain::Real { min, .. } | Domain::Whole { min, .. } = variable.domain {
-                self.tree.set(&variable.path, Tree::Number(min));
-            }
-        }
-        self.derive();
-    }
-
-    /// Finds the variables that this form parses as whole numbers: they reject a number with a half. All are tried at
-    /// once, because there may be thousands.
-    fn find_whole(&self, variables: &mut [Variable], indices: &[usize]) {
-        let mut tree = self.tree.clone();
-        let mut real = BTreeMap::new();
-        for &index in indices {
-            let Variable { pointer, path, domain, .. } = &variables[index];
-            if let Domain::Real { min, .. } = domain {
-                tree.set(path, Tree::Number(min.floor() + 0.5));
-                real.insert(pointer.clone(), index);
-            }
-        }
-        while let Err(found) = tree.read::<Design>()
-            && found.code == FieldCode::WrongType
-            && let Some(index) = real.remove(&found.pointer)
-        {
-            let Variable { path, domain, .. } = &mut variables[index];
-            if let Domain::Real { min, max } = *domain {
-                *domain = Domain::Whole { min: min.ceil(), max: max.floor() };
-                tree.set(path, Tree::Number(min.ceil()));
-            }
-        }
-    }
-}
-
-impl Variable {
-    /// Estimated memory in bytes.
-    fn bytes(&self) -> usize {
-        let path = self.path.iter().map(|name| size_of::<String>() + GRAIN_BYTES + name.len());
-        let choices = self.choices.iter().map(|choice| GRAIN_BYTES + choice.bytes());
-        size_of::<Self>() + GRAIN_BYTES + self.pointer.len() + path.sum::<usize>() + choices.sum::<usize>()
-    }
-
-    /// Returns the value at a fraction of the domain, 0 to 1. Every whole number and every choice has an equal part.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of choices")]
-    pub(crate) fn at_share(&self, share: f64) -> Value {
-        match self.domain {
-            Domain::Real { min, max } => Value::Number((min + share * (max - min)).clamp(min, max)),
-            Domain::Whole { min, max } => Value::Number((min + (share * (max - min + 1.0)).floor()).min(max)),
-            Domain::OneOf(count) => Value::Choice(((share * count as f64) as usize).min(count - 1)),
-        }
-    }
-
-    /// Path of the field in a design.
-    pub(crate) fn path(&self) -> &[String] {
-        &self.path
-    }
-
-    /// The choices, if it has a list.
-    pub(crate) fn choices(&self) -> &[Tree] {
-        &self.choices
-    }
-
-    /// Returns a value as in documents.
-    pub(crate) fn spelled(&self, value: Value) -> Tree {
-        match value {
-            Value::Number(number) => Tree::Number(number),
-            Value::Choice(chosen) => self.choices[chosen].clone(),
         }
     }
 }

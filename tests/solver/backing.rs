@@ -59,8 +59,7 @@ fn results() -> Results {
     serde_json::from_str(include_str!("../finite_elements/backing.json")).unwrap()
 }
 
-const JOHNSON: ContactLaw =
-    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+const JOHNSON: ContactLaw = ContactLaw::JOHNSON;
 
 fn johnson(torque_nm: f64) -> LoadParameters {
     LoadParameters { law: JOHNSON, ..load(torque_nm, VirtualWork) }

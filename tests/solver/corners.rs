@@ -77,8 +77,7 @@ fn results() -> Results {
 /// Position ψ_e of the flank's end in case 5.2, in degrees.
 const FLANK_END_DEG: f64 = 43.607_599;
 
-const JOHNSON: ContactLaw =
-    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+const JOHNSON: ContactLaw = ContactLaw::JOHNSON;
 
 fn pressed_corners(torque_nm: f64) -> LoadParameters {
     LoadParameters { law: JOHNSON, corner_contact: true, ..load(torque_nm, VirtualWork) }

@@ -2,10 +2,9 @@
 
 use proptest::prelude::*;
 use toothwave_solver::mesh::Mesh;
-use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
-    Never, PerContact, ToothShape, Torque, WaveGenerator,
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, ToothShape, Torque,
+    WaveGenerator,
     sweep::{self, Points, Sweep},
 };
 
@@ -70,25 +69,8 @@ pub(crate) fn drive(parameters: &DriveParameters) -> Drive {
 
 /// Returns a load with steel throughout and linear stiffness.
 pub(crate) fn load(torque_nm: f64, compatibility: Compatibility) -> LoadParameters {
-    LoadParameters {
-        materials: Materials {
-            wave_generator: Material::STEEL,
-            teeth: Material::STEEL,
-            ring: Material::STEEL,
-            carrier: Material::STEEL,
-        },
-        torque: Torque::Input(torque_nm),
-        compatibility,
-        law: ContactLaw::Linear,
-        series_compliance_mm_per_n: PerContact::default(),
-        ring_teeth_bend: false,
-        wave_generator_moves: false,
-        corner_contact: false,
-        clearance_um: PerContact::default(),
-        modification: Modification::default(),
-        carrier: CarrierRadii::default(),
-        allowable_stress_mpa: None,
-    }
+    let torque = Torque::Input(torque_nm);
+    LoadParameters { torque, compatibility, law: ContactLaw::Linear, ..LoadParameters::default() }
 }
 
 /// Returns one number for each contact.

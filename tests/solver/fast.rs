@@ -822,8 +822,7 @@ proptest! {
 }
 
 /// Johnson's law with its default depths.
-const JOHNSON: ContactLaw =
-    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+const JOHNSON: ContactLaw = ContactLaw::JOHNSON;
 
 /// A force of 3e-13 of the largest has six correct digits, and so has its stress.
 #[test]

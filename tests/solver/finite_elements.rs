@@ -320,7 +320,7 @@ fn model_errors_are_generated_from_the_results() {
         "//! Errors of the model against elastic bodies, in per cent. Generated from `tests/finite_elements`: run\n\
          //! `WRITE_MODEL_ERRORS=1 cargo test -p toothwave-solver --test solver -- model_errors_are_generated`.\n\n\
          use super::{{Row, row}};\n\
-         use crate::contact::LawName::{{Johnson, Linear, Palmgren}};\n\
+         use crate::contact_law::LawName::{{Johnson, Linear, Palmgren}};\n\
          use crate::load_sharing::Compatibility::{{Projection, VirtualWork}};\n\n\
          /// Model, its refinements, pointed tips and gaps; errors of force, stress and wind-up.\n\
          pub(super) const MEASURED: [Row; {}] = [\n{}];\n",
@@ -346,8 +346,7 @@ fn pressure_angle_above_calculated_drives_is_reported() {
     for semi_minor_mm in [49.5, 49.3, 49.1, 48.9] {
         let parameters = DriveParameters { wave_generator: ellipse(50.7, semi_minor_mm), ..PAPER_5_2 };
         let drive = Drive::new(&parameters).unwrap();
-        let load =
-            LoadParameters { law: ContactLaw::Johnson { depth_mm: PerContact::default() }, ..load(3.0, VirtualWork) };
+        let load = LoadParameters { law: ContactLaw::JOHNSON, ..load(3.0, VirtualWork) };
         let sweep = swept(&parameters, &load, 20);
         let case = LoadCase::new(&load).unwrap();
         let error = model_error::of(&drive, &case, &Deviations::default(), &sweep, None).unwrap();
@@ -373,7 +372,7 @@ fn wind_up_above_calculated_drives_is_reported() {
     };
     for (parameters, gap_um, off) in [(path(63.0, 0.3, 5.0), 10.0, 0.016), (path(14.38, 0.061, 1.1118), 7.4, 0.055)] {
         let drive = Drive::new(&parameters).unwrap();
-        let law = ContactLaw::Johnson { depth_mm: PerContact::default() };
+        let law = ContactLaw::JOHNSON;
         let clearance_um = PerContact { ring: gap_um, ..PerContact::default() };
         let load = LoadParameters { law, clearance_um, ..load(1e-5, VirtualWork) };
         let sweep = swept(&parameters, &load, 400);

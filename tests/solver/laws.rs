@@ -20,11 +20,8 @@ use toothwave_solver::{
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, cases, drive, everywhere, load, swept};
 
-const R_DEEP: ContactLaw =
-    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
-
 fn johnson(torque_nm: f64) -> LoadParameters {
-    LoadParameters { law: R_DEEP, ..load(torque_nm, VirtualWork) }
+    LoadParameters { law: ContactLaw::JOHNSON, ..load(torque_nm, VirtualWork) }
 }
 
 /// Returns a load with titanium teeth, ceramic, cast iron and bronze parts, each with its own depth.
@@ -269,7 +266,7 @@ fn johnson_lies_between_linear_and_palmgren() {
         println!("5.1, {law:?}: peak F_H {:.3} N, wind-up {most_deg:.5} deg", sweep.peaks.wave_generator.force_n.value);
         (sweep.peaks.wave_generator.force_n.value, most_deg)
     };
-    let (linear, palmgren, johnson) = (peak(ContactLaw::Linear), peak(ContactLaw::Palmgren), peak(R_DEEP));
+    let (linear, palmgren, johnson) = (peak(ContactLaw::Linear), peak(ContactLaw::Palmgren), peak(ContactLaw::JOHNSON));
     assert!(linear.0 < palmgren.0 && palmgren.0 < johnson.0 && johnson.0 < 1.01 * palmgren.0, "{johnson:?}");
     assert!(linear.1 < johnson.1 && johnson.1 < palmgren.1, "{johnson:?}");
 }
@@ -416,7 +413,7 @@ fn tolerance_sweep_finds_peaks_under_these_laws() {
 #[test]
 fn projection_rejects_johnsons_law_and_series_compliance() {
     let refused = |parameters: LoadParameters| LoadCase::new(&parameters).unwrap_err();
-    let projected = LoadParameters { law: R_DEEP, ..load(20.0, Projection) };
+    let projected = LoadParameters { law: ContactLaw::JOHNSON, ..load(20.0, Projection) };
     assert_eq!(refused(projected), [Violation::NeedsVirtualWork { parameter: Parameter::Law }]);
     let mut springy = load(20.0, Projection);
     springy.series_compliance_mm_per_n.carrier = 1e-6;
@@ -627,7 +624,7 @@ fn flat_sided_teeth_work_with_any_cylinder_law() {
         carrier_inner_radius_mm: 58.5,
         carrier_outer_radius_mm: outer_mm,
     };
-    for law in [ContactLaw::Linear, ContactLaw::Palmgren, R_DEEP] {
+    for law in [ContactLaw::Linear, ContactLaw::Palmgren, ContactLaw::JOHNSON] {
         let case = LoadCase::new(&LoadParameters { law, ..load(20.0, VirtualWork) }).unwrap();
         let loaded = LoadedDrive::with_teeth(&drive, &case, &shape(65.5)).unwrap();
         let mesh = Mesh::new(&drive);
@@ -666,7 +663,7 @@ fn given_carrier_bears_the_flats() {
     let draft = Draft::new(&parameters).unwrap();
     for (inner_mm, outer_mm) in [(None, None), (Some(61.0), None), (None, Some(62.0)), (Some(60.5), Some(62.5))] {
         let carrier = CarrierRadii { inner_mm, outer_mm };
-        let load = LoadParameters { law: R_DEEP, carrier, ..load(20.0, VirtualWork) };
+        let load = LoadParameters { law: ContactLaw::JOHNSON, carrier, ..load(20.0, VirtualWork) };
         assert!(load.carrier_violations(&draft).is_empty());
         let found = sweep::sweep(&drive, &LoadCase::new(&load).unwrap(), Points::samples(8).unwrap(), &Never).unwrap();
         assert!(found.torque_balance_residual < 1e-14);
@@ -773,7 +770,11 @@ fn only_balls_take_hertz_beside_fixed() {
     };
     let fixed = ContactLaw::Fixed(PerContact { wave_generator: 1e5, ring: 1e5, carrier: 1e5 });
     assert!(accepts(ContactLaw::Hertz, &ball) && accepts(fixed, &ball));
-    assert!(!accepts(ContactLaw::Linear, &ball) && !accepts(ContactLaw::Palmgren, &ball) && !accepts(R_DEEP, &ball));
+    assert!(
+        !accepts(ContactLaw::Linear, &ball)
+            && !accepts(ContactLaw::Palmgren, &ball)
+            && !accepts(ContactLaw::JOHNSON, &ball)
+    );
     assert!(!accepts(ContactLaw::Hertz, &ToothContact::Cylinder));
 }
 

@@ -14,8 +14,7 @@ use toothwave_solver::{
 
 use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, everywhere, load, swept};
 
-const JOHNSON: ContactLaw =
-    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+const JOHNSON: ContactLaw = ContactLaw::JOHNSON;
 
 const THREE_LOBES: DriveParameters = DriveParameters {
     wave_generator: WaveGenerator::HarmonicPath { lobes: 3, mean_path_radius_mm: 52.0, amplitude_mm: 1.0 },

@@ -8,12 +8,11 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::mesh::{Mesh, Samples};
-use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::sweep::{self, Points, States, Sweep};
 use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
-    Never, PerContact, SolveError, ToothShape, Torque,
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Never,
+    PerContact, SolveError, ToothShape, Torque,
 };
 
 use crate::drives::{ellipse, everywhere};
@@ -106,9 +105,6 @@ impl Case {
                     carrier: fixed("carrier_n_per_mm"),
                 }),
             },
-            ring_teeth_bend: false,
-            wave_generator_moves: false,
-            corner_contact: false,
             series_compliance_mm_per_n: per_contact(|contact| {
                 document["model"]["series_compliance_mm_per_n"][contact].as_f64().unwrap_or(0.0)
             }),
@@ -117,9 +113,8 @@ impl Case {
                 ring: gap("ring_um"),
                 carrier: gap("carrier_um"),
             },
-            modification: Modification::default(),
-            carrier: CarrierRadii::default(),
             allowable_stress_mpa: load["allowable_stress_mpa"].as_f64().map(everywhere),
+            ..LoadParameters::default()
         })
         .unwrap()
     }

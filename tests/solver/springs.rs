@@ -52,7 +52,7 @@ fn forces_balance_any_torque_to_1e_12() {
 #[test]
 fn negligible_gaps_do_not_change_loads() {
     let drive = drive(&PAPER_5_1);
-    for law in [ContactLaw::Johnson { depth_mm: PerContact::default() }, ContactLaw::Palmgren, ContactLaw::Linear] {
+    for law in [ContactLaw::JOHNSON, ContactLaw::Palmgren, ContactLaw::Linear] {
         for torque_nm in [1e-12, 20.0, 1e3] {
             let without = LoadParameters { law, ..load(torque_nm, VirtualWork) };
             let swept = |parameters: LoadParameters| {
@@ -93,7 +93,7 @@ fn equal_rotation_is_lost_motion_under_any_load() {
         (deviating(Deviations { slot_angle_arcsec: vec![arcsec; 14], ..Deviations::default() }), 7.0 * rad),
         (deviating(Deviations { ring_space_angle_arcsec: vec![arcsec; 12], ..Deviations::default() }), 6.0 * rad),
     ];
-    let johnson = ContactLaw::Johnson { depth_mm: PerContact::default() };
+    let johnson = ContactLaw::JOHNSON;
     for law in laws().into_iter().chain([johnson]) {
         for torque_nm in [1e-12, 1e-9, 1e-6, 1e-3, 1.0] {
             let swept = |modification, deviations: &Deviations| {

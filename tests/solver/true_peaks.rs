@@ -17,8 +17,7 @@ use crate::tolerances::{designs, of_many_teeth};
 
 const MAX_STATES: u64 = 10_000_000;
 
-const JOHNSON: ContactLaw =
-    ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: None } };
+const JOHNSON: ContactLaw = ContactLaw::JOHNSON;
 
 fn of(parameters: &DriveParameters, load: &LoadParameters, points: Points) -> Result<SweepPeaks, SolveError> {
     peaks(&drive(parameters), &LoadCase::new(load).unwrap(), points, &Never)

@@ -126,7 +126,7 @@ fn shapes() -> Vec<DriveParameters> {
 }
 
 fn loads(end_deg: f64) -> Vec<LoadParameters> {
-    let johnson = ContactLaw::Johnson { depth_mm: PerContact::default() };
+    let johnson = ContactLaw::JOHNSON;
     let of_gaps = |clearance_um| LoadParameters { clearance_um, law: johnson, ..load(2.0, VirtualWork) };
     let relieved = |power, share| Modification {
         ring_tip_relief: Some(TipRelief { amount_um: 12.0, start_deg: share * end_deg, power }),

@@ -5,16 +5,15 @@ use std::borrow::Cow;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use toothwave_solver::{Compatibility, ContactLaw, PerContact};
+use toothwave_solver::{Compatibility, PerContact};
 use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
-use super::drive::LengthsByContactDocument;
+use super::contact_law::StiffnessDocument;
 use super::number::given;
 use super::refinements::RefinementsDocument;
 use crate::key::{Encode, Encoder, encoded};
-use crate::union::union;
 
 /// The model of load sharing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -89,79 +88,6 @@ pub struct CompliancesDocument {
     /// At the carrier, in mm/N. Default: 0 mm/N.
     #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub carrier: f64,
-}
-
-union! {
-    /// The contact law.
-    pub enum StiffnessDocument as "Stiffness" by "law" read "by:law" {
-        /// The paper's stiffness k = (π/2) L1 E* at each contact.
-        Linear(LinearDocument) = "linear",
-        /// Given stiffnesses.
-        Fixed(FixedDocument) = "fixed",
-        /// Palmgren's law for steel cylinders.
-        Palmgren(PalmgrenDocument) = "palmgren",
-        /// Johnson's law for line contacts.
-        Johnson(JohnsonDocument) = "johnson",
-        /// Hertz's law for balls.
-        Hertz(HertzDocument) = "hertz",
-    }
-}
-
-/// The paper's stiffness k = (π/2) L1 E* at each contact, several times too high.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
-pub struct LinearDocument {}
-
-/// Given stiffnesses at the wave generator, the ring and the carrier, in N/mm.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
-pub struct FixedDocument {
-    /// Stiffness at the wave generator, in N/mm.
-    #[schema(minimum = 1e-3, maximum = 1e15)]
-    pub wave_generator_n_per_mm: f64,
-    /// Stiffness at the ring, in N/mm.
-    #[schema(minimum = 1e-3, maximum = 1e15)]
-    pub ring_n_per_mm: f64,
-    /// Stiffness at the carrier, in N/mm.
-    #[schema(minimum = 1e-3, maximum = 1e15)]
-    pub carrier_n_per_mm: f64,
-}
-
-/// Palmgren's law δ = 3.84e-5 F^0.9/L1^0.8 (N, mm) for steel on steel.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
-pub struct PalmgrenDocument {}
-
-/// Logarithmic approach of a cylinder between two bodies (Johnson, Contact Mechanics, section 5.6).
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
-pub struct JohnsonDocument {
-    /// Depth below each contact at which the body is fixed, in mm. Default: the tooth's radius.
-    #[serde(default)]
-    pub depth_mm: LengthsByContactDocument,
-}
-
-/// Hertz's law of point contacts, δ = q F^(2/3), for balls.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
-pub struct HertzDocument {}
-
-impl From<&StiffnessDocument> for ContactLaw {
-    fn from(document: &StiffnessDocument) -> Self {
-        match document {
-            StiffnessDocument::Linear(_) => Self::Linear,
-            StiffnessDocument::Palmgren(_) => Self::Palmgren,
-            StiffnessDocument::Fixed(stiffness) => Self::Fixed(PerContact {
-                wave_generator: stiffness.wave_generator_n_per_mm,
-                ring: stiffness.ring_n_per_mm,
-                carrier: stiffness.carrier_n_per_mm,
-            }),
-            StiffnessDocument::Johnson(JohnsonDocument { depth_mm }) => {
-                Self::Johnson { depth_mm: depth_mm.by_contact() }
-            }
-            StiffnessDocument::Hertz(_) => Self::Hertz,
-        }
-    }
 }
 
 /// The word that stands for the estimates.
@@ -268,11 +194,6 @@ encoded! {
     }
     struct ClearanceDocument { wave_generator_um, ring_um, carrier_um }
     struct CompliancesDocument { wave_generator, ring, carrier }
-    struct LinearDocument {}
-    struct FixedDocument { wave_generator_n_per_mm, ring_n_per_mm, carrier_n_per_mm }
-    struct PalmgrenDocument {}
-    struct JohnsonDocument { depth_mm }
-    struct HertzDocument {}
 }
 
 encoded!(enum Compatibility);

@@ -262,12 +262,7 @@ impl Design {
     /// Returns the contact law with all its values.
     pub fn stiffness(&self) -> StiffnessDocument {
         let mut stiffness = self.model.stiffness.clone().unwrap_or_else(|| self.law_by_default());
-        if let StiffnessDocument::Johnson(JohnsonDocument { depth_mm }) = &mut stiffness {
-            let radius_mm = self.drive.teeth.counted().radius_mm;
-            for depth_mm in [&mut depth_mm.wave_generator, &mut depth_mm.ring, &mut depth_mm.carrier] {
-                depth_mm.get_or_insert(radius_mm);
-            }
-        }
+        stiffness.fill_in(self.drive.teeth.counted().radius_mm);
         stiffness
     }
 
@@ -291,7 +286,6 @@ impl Design {
         self
     }
 
-    /// Returns the parts for keys.
     pub(crate) fn parts_in_key(&self) -> impl Encode + '_ {
         (&self.parts, self.clearance_in_key())
     }
@@ -323,7 +317,6 @@ impl Design {
 }
 
 impl ModelDocument {
-    /// Returns the deprecated switches.
     const fn switches(&self) -> [(DeprecatedField, Option<bool>); 3] {
         [
             (DeprecatedField::RingTeethBend, self.ring_teeth_bend),

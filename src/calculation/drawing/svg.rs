@@ -45,7 +45,6 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     writeln!(writer, "</g>\n</svg>")
 }
 
-/// Returns the title of a drawing.
 pub(super) fn title(drawing: &DrawingAnswer) -> String {
     let DrawingAnswer { solver_version, design_hash, .. } = drawing;
     format!("toothwave {solver_version}, {}, design {design_hash}", crate::json::word(&drawing.subject))

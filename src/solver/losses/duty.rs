@@ -74,6 +74,7 @@ impl Duty {
 /// angles.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+#[non_exhaustive]
 pub struct LossTotals {
     /// Efficiency over the period, the torque at the driven end given.
     pub efficiency: Efficiencies<f64>,
@@ -151,6 +152,32 @@ pub struct DutySweep<'a> {
 impl DutySweep<'_> {
     /// Returns the losses. Takes the sweep of the hardest point and, if bearings are required, its transverse forces on
     /// the wave generator.
+    ///
+    /// ```
+    /// use toothwave_solver::losses::duty::{Duty, DutyPoint, DutySweep, LossParameters};
+    /// use toothwave_solver::losses::{Friction, FrictionParameters, WaveGeneratorFriction};
+    /// use toothwave_solver::sweep::{Points, sweep};
+    /// # use toothwave_solver::{Deviations, Torque};
+    /// # use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never};
+    /// let drive = Drive::new(&DriveParameters::default()).unwrap();
+    /// let load = LoadCase::new(&LoadParameters::default()).unwrap();
+    ///
+    /// let light = LoadCase::new(&LoadParameters { torque: Torque::Input(5.0), ..LoadParameters::default() }).unwrap();
+    /// let point = |load, share_of_time| DutyPoint { load, input_speed_rpm: Some(1500.0), share_of_time };
+    /// let duty = Duty { points: vec![point(load, 0.1), point(light, 0.9)], hardest: 0 };
+    /// let friction = Friction::new(&FrictionParameters {
+    ///     wave_generator: WaveGeneratorFriction::Plain { coefficient: 0.01 },
+    ///     ring_coefficient: 0.05,
+    ///     carrier_coefficient: 0.05,
+    /// })
+    /// .unwrap();
+    /// let parameters = LossParameters { friction, wear_rate_mm3_per_nm: None, bearing: None };
+    /// let points = Points::samples(50).unwrap();
+    /// let hardest = sweep(&drive, &load, points, &Never).unwrap();
+    /// let of_duty = DutySweep { drive: &drive, deviations: &Deviations::default(), points, duty: &duty };
+    /// let totals = of_duty.losses(&parameters, &hardest, None, &Never).unwrap().totals;
+    /// assert!(totals.power_loss_w.is_some());
+    /// ```
     ///
     /// # Errors
     /// The errors of [`sweep_with_deviations`].

@@ -61,6 +61,7 @@ impl LossByPlace {
 
 /// Friction losses over the period of a sweep.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Losses {
     /// Mean loss ratio over the period.
     pub mean: LossByPlace,
@@ -83,6 +84,26 @@ impl Mechanism {
 
 impl Losses {
     /// Returns the losses over the sweep of this drive under this load.
+    ///
+    /// ```
+    /// use toothwave_solver::losses::period::Losses;
+    /// use toothwave_solver::losses::{Fixed, Friction, FrictionParameters, Mechanism, WaveGeneratorFriction};
+    /// use toothwave_solver::sweep::{Points, sweep};
+    /// # use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never};
+    /// let drive = Drive::new(&DriveParameters::default()).unwrap();
+    /// let load = LoadCase::new(&LoadParameters::default()).unwrap();
+    ///
+    /// let sweep = sweep(&drive, &load, Points::samples(100).unwrap(), &Never).unwrap();
+    /// let friction = Friction::new(&FrictionParameters {
+    ///     wave_generator: WaveGeneratorFriction::Plain { coefficient: 0.01 },
+    ///     ring_coefficient: 0.05,
+    ///     carrier_coefficient: 0.05,
+    /// })
+    /// .unwrap();
+    /// let losses = Losses::of(&drive, &load, &sweep, &friction, &Never).unwrap();
+    /// let efficiency = Mechanism::of(&drive).efficiency(Fixed::Ring, losses.mean.total());
+    /// assert!(efficiency.driven > 0.5 && efficiency.driven < 1.0);
+    /// ```
     ///
     /// # Errors
     /// [`SolveError::NotConverged`] from the geometry, [`SolveError::Stopped`] when `stop` says so.

@@ -2,7 +2,7 @@
 //! `WRITE_MODEL_ERRORS=1 cargo test -p toothwave-solver --test solver -- model_errors_are_generated`.
 
 use super::{Row, row};
-use crate::contact::LawName::{Johnson, Linear, Palmgren};
+use crate::contact_law::LawName::{Johnson, Linear, Palmgren};
 use crate::load_sharing::Compatibility::{Projection, VirtualWork};
 
 /// Model, its refinements, pointed tips and gaps; errors of force, stress and wind-up.

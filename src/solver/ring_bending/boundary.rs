@@ -104,7 +104,6 @@ impl Piece {
         Ok(Self { elements })
     }
 
-    /// Returns all elements.
     pub(super) fn elements(&self) -> &[Element] {
         &self.elements
     }

@@ -10,9 +10,6 @@ mod points;
 mod search;
 mod unloaded;
 
-#[cfg(test)]
-mod tried;
-
 use crate::drive::Drive;
 use crate::gaps::Deviations;
 use crate::load_sharing::{LoadCase, LoadedDrive};
@@ -26,6 +23,21 @@ pub use points::{Points, Tolerance};
 pub use unloaded::unloaded_wind_up_deg;
 
 /// Runs the sweep over one period.
+///
+/// ```
+/// use toothwave_solver::sweep::{Points, sweep};
+/// # use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never};
+/// let drive = Drive::new(&DriveParameters::default()).unwrap();
+/// let load = LoadCase::new(&LoadParameters::default()).unwrap();
+///
+/// let sweep = sweep(&drive, &load, Points::samples(100).unwrap(), &Never).unwrap();
+/// // The teeth in mesh at the first input angle, with their forces at the ring.
+/// for state in (0..sweep.states.len()).take_while(|&state| sweep.states.input_angle_deg[state] == 0.0) {
+///     println!("tooth {}: {:.0} N", sweep.states.tooth[state], sweep.states.force_n.ring[state]);
+/// }
+/// let stiffness_nm_per_rad = &sweep.input_angles.torsional_stiffness_nm_per_rad;
+/// assert_eq!(stiffness_nm_per_rad.len(), 101);
+/// ```
 ///
 /// # Errors
 /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] if no finite forces exist,
@@ -47,6 +59,21 @@ fn swept(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &dyn S
 /// Runs the sweep of a drive with deviations of individual items. States are listed by slot and lobe. The sweep covers
 /// the load periods after which all items are back in their positions ([`Deviations::mesh`]).
 ///
+/// ```
+/// use toothwave_solver::sweep::{Points, sweep_with_deviations};
+/// # use toothwave_solver::Deviations;
+/// # use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never};
+/// let drive = Drive::new(&DriveParameters::default()).unwrap();
+/// let load = LoadCase::new(&LoadParameters::default()).unwrap();
+///
+/// // One tooth of 28 is 20 µm too thin.
+/// let mut tooth_radius_um = vec![0.0; 28];
+/// tooth_radius_um[3] = 20.0;
+/// let deviations = Deviations { tooth_radius_um, ..Deviations::default() };
+/// let sweep = sweep_with_deviations(&drive, &load, &deviations, Points::samples(100).unwrap(), &Never).unwrap();
+/// assert!(sweep.transmission_error_peak_to_peak_deg(&drive) > 0.0);
+/// ```
+///
 /// # Errors
 /// As [`sweep`]; [`SolveError::Impossible`] for deviations that this drive or this load cannot have,
 /// [`SolveError::Interference`] if a tooth is pressed without load.
@@ -66,6 +93,16 @@ pub fn sweep_with_deviations(
 /// Returns the peaks of the sweep over one period without its states, in less time. Period closure is not checked. If
 /// zones are not alike, they are evaluated superposed: what the states would show in successive laps is reported for
 /// the first.
+///
+/// ```
+/// use toothwave_solver::sweep::{Points, peaks};
+/// # use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never};
+/// let drive = Drive::new(&DriveParameters::default()).unwrap();
+/// let load = LoadCase::new(&LoadParameters::default()).unwrap();
+///
+/// let peaks = peaks(&drive, &load, Points::samples(100).unwrap(), &Never).unwrap();
+/// assert!(peaks.contacts.wave_generator.stress_mpa.value > 0.0);
+/// ```
 ///
 /// # Errors
 /// As [`sweep`].
@@ -92,6 +129,7 @@ pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) ->
 ///
 /// # Errors
 /// As [`sweep`].
+#[doc(hidden)]
 pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
     plain::sweep(&LoadedDrive::new(drive, load)?, load, points, Looking::Plain, stop)
 }
@@ -100,6 +138,7 @@ pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn St
 ///
 /// # Errors
 /// As [`sweep_with_deviations`].
+#[doc(hidden)]
 pub fn sweep_plain_with_deviations(
     drive: &Drive,
     load: &LoadCase,

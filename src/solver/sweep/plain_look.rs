@@ -124,27 +124,15 @@ impl Look for PlainLook<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parts::CarrierRadii;
-    use crate::sweep::tried::PAPER_5_1;
-    use crate::{Compatibility, ContactLaw, Drive, LoadParameters, Material, Materials, Modification, Never, Torque};
+    use crate::{ContactLaw, Drive, DriveParameters, LoadParameters, Never};
 
     #[test]
     fn pressed_teeth_are_those_that_carry() {
-        let drive = Drive::new(&PAPER_5_1).expect("a possible drive");
-        let steel = Material::STEEL;
+        let drive = Drive::new(&DriveParameters::default()).expect("a possible drive");
         let case = LoadCase::new(&LoadParameters {
-            materials: Materials { wave_generator: steel, teeth: steel, ring: steel, carrier: steel },
-            torque: Torque::Input(20.0),
-            compatibility: Compatibility::VirtualWork,
             law: ContactLaw::Palmgren,
-            series_compliance_mm_per_n: PerContact::default(),
-            ring_teeth_bend: false,
-            wave_generator_moves: false,
-            corner_contact: false,
             clearance_um: PerContact { wave_generator: 0.0, ring: 20.0, carrier: 5.0 },
-            modification: Modification::default(),
-            carrier: CarrierRadii::default(),
-            allowable_stress_mpa: None,
+            ..LoadParameters::default()
         });
         let case = case.expect("a possible load");
         let loaded = LoadedDrive::new(&drive, &case).expect("a possible case");

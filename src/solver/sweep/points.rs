@@ -23,6 +23,18 @@ impl Points {
 
     /// Returns a tolerance for the true extremes, with a limit of evaluated states.
     ///
+    /// ```
+    /// use toothwave_solver::sweep::{Points, sweep};
+    /// # use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never};
+    /// let drive = Drive::new(&DriveParameters::default()).unwrap();
+    /// let load = LoadCase::new(&LoadParameters::default()).unwrap();
+    ///
+    /// let points = Points::tolerance(1e-6, 1_000_000).unwrap();
+    /// let peak = sweep(&drive, &load, points, &Never).unwrap().peaks.ring.force_n;
+    /// let sampled = sweep(&drive, &load, Points::samples(100).unwrap(), &Never).unwrap().peaks.ring.force_n;
+    /// assert!(peak.value >= sampled.value);
+    /// ```
+    ///
     /// # Errors
     /// As [`Tolerance::new`].
     pub fn tolerance(relative: f64, max_states: u64) -> Result<Self, Violation> {

@@ -20,6 +20,18 @@ const LEAST_MARGIN: f64 = 1e-12;
 /// Returns `Δφ_0 = min θ_i` at each input angle of a sweep of this drive, load and deviations. It is the limit of the
 /// wind-up as the torque goes to zero, and 0 without gaps.
 ///
+/// ```
+/// use toothwave_solver::sweep::{Points, sweep, unloaded_wind_up_deg};
+/// # use toothwave_solver::Deviations;
+/// # use toothwave_solver::{Drive, DriveParameters, LoadCase, LoadParameters, Never};
+/// let drive = Drive::new(&DriveParameters::default()).unwrap();
+/// let load = LoadCase::new(&LoadParameters::default()).unwrap();
+///
+/// let sweep = sweep(&drive, &load, Points::samples(100).unwrap(), &Never).unwrap();
+/// let unloaded_deg = unloaded_wind_up_deg(&drive, &load, &Deviations::default(), &sweep, &Never).unwrap();
+/// assert!(unloaded_deg.iter().all(|&angle_deg| angle_deg == 0.0));
+/// ```
+///
 /// # Errors
 /// As the sweep itself.
 pub fn unloaded_wind_up_deg(

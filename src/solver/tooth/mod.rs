@@ -1,20 +1,22 @@
 //! Contacts of a tooth: approach and pressure under a force (docs/explanation/theory.md sections 4.3 and 5).
 
 pub mod flat;
-pub(crate) mod line;
 pub mod point;
+mod pressure;
 
 use std::f64::consts::PI;
 
+use flat::FlatContact;
+use point::EllipticContact;
+
 use crate::approach::{Approach, Corner, Logarithmic};
-use crate::contact::{Contact, ContactLaw, HertzLine, Materials, PerContact};
+use crate::contact::{Contact, HertzLine, Materials, PerContact};
+use crate::contact_law::{ContactLaw, LogarithmicTerm, PALMGREN_EXPONENT, Term};
 use crate::drive::{Drive, ToothShape};
 use crate::parts::CarrierRadii;
 use crate::root::NotConverged;
-use crate::violation::Parameter;
-use flat::FlatContact;
-use line::JohnsonLine;
-use point::EllipticContact;
+
+pub use pressure::{CornerContact, Pressure};
 
 /// Shape of a tooth, as its contacts need it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,21 +55,6 @@ impl ToothContact {
     }
 }
 
-/// Relation of force and approach at one contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Law {
-    /// `δ = F/k`.
-    Linear { compliance_mm_per_n: f64 },
-    /// `δ = q F^p`.
-    Power { exponent: f64, coefficient: f64 },
-    /// Johnson's line.
-    Johnson(JohnsonLine),
-    /// Hertz's ellipse, whose coefficient depends on the place.
-    Ellipse,
-    /// A flat, whose compliance depends on the place.
-    Flat,
-}
-
 /// Law of the three contacts of a tooth, for column-wise evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ToothLaw {
@@ -77,14 +64,11 @@ pub(crate) enum ToothLaw {
     Palmgren { coefficient: f64 },
     /// Palmgren's law at wave generator, ring and (unless a flat is there) carrier, plus a linear compliance.
     PalmgrenAndLinear { coefficient: PerContact<f64>, compliance_mm_per_n: PerContact<f64> },
-    /// Johnson's line, plus the series compliance.
-    Johnson { law: PerContact<JohnsonLine>, series_compliance_mm_per_n: PerContact<f64> },
+    /// `δ = F (A + B ln(F_r/F))`, plus the series compliance.
+    Logarithmic { law: PerContact<LogarithmicTerm>, series_compliance_mm_per_n: PerContact<f64> },
     /// Hertz's ellipses.
     Hertz,
 }
-
-/// `p` of Palmgren's law.
-pub(crate) const PALMGREN_EXPONENT: f64 = 0.9;
 
 /// Powers of the stresses to which forces are proportional.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -177,68 +161,6 @@ impl Flat {
     }
 }
 
-/// Pressure model of a contact at a place.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Pressure {
-    /// Hertz's line.
-    Line {
-        /// Stress law.
-        hertz: HertzLine,
-        /// Relative curvature, in 1/mm.
-        curvature_per_mm: f64,
-    },
-    /// Hertz's ellipse.
-    Ellipse(EllipticContact),
-    /// Uniform pressure.
-    Flat(FlatContact),
-    /// Contact with a corner. No pressure is calculated: by Hertz there is none, and at a sharp corner it is infinite.
-    Corner(CornerContact),
-}
-
-/// Contact of a tooth with the corner that ends the ring's flank.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CornerContact {
-    /// Relative curvature of the tooth and the flank's end, in 1/mm.
-    pub(crate) curvature_per_mm: f64,
-    /// Angle between the contact and the flank's normal there.
-    pub(crate) angle_rad: f64,
-    /// Growth of the ring tooth's bending compliance for each unit of the logarithm by which the contact is narrower.
-    pub(crate) bending_growth_mm_per_n: f64,
-}
-
-impl Pressure {
-    /// Returns the largest pressure under a force; the mean pressure for a flat, 0 for a corner.
-    pub fn stress_mpa(&self, force_n: f64) -> f64 {
-        match self {
-            Self::Line { hertz, curvature_per_mm } => hertz.stress_mpa(force_n, *curvature_per_mm),
-            Self::Ellipse(ellipse) => ellipse.stress_mpa(force_n),
-            Self::Flat(flat) => flat.stress_mpa(force_n),
-            Self::Corner(_) => 0.0,
-        }
-    }
-
-    /// Returns the pressure in the middle plane, integrated along the plane of motion. For an ellipse it is `π a p/2`
-    /// with its half-width a, otherwise the force over the width. It is 0 for a corner, which stays in contact: its
-    /// wear differs from a flank's.
-    pub fn line_load_n_per_mm(&self, force_n: f64, tooth_width_mm: f64) -> f64 {
-        match self {
-            Self::Line { .. } | Self::Flat(_) => force_n / tooth_width_mm,
-            Self::Ellipse(ellipse) => 0.5 * PI * ellipse.half_width_mm(force_n) * ellipse.stress_mpa(force_n),
-            Self::Corner(_) => 0.0,
-        }
-    }
-
-    /// Returns the force for a stress, the inverse of [`Self::stress_mpa`].
-    pub fn force_n(&self, stress_mpa: f64) -> f64 {
-        match self {
-            Self::Line { hertz, curvature_per_mm } => hertz.force_n(stress_mpa, *curvature_per_mm),
-            Self::Ellipse(ellipse) => ellipse.force_n(stress_mpa),
-            Self::Flat(flat) => flat.force_n(stress_mpa),
-            Self::Corner(_) => f64::INFINITY,
-        }
-    }
-}
-
 /// The three contacts of the teeth of a drive under a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Contacts {
@@ -247,7 +169,7 @@ pub(crate) struct Contacts {
     tooth_width_mm: f64,
     modulus_mpa: PerContact<f64>,
     hertz: PerContact<HertzLine>,
-    law: PerContact<Law>,
+    law: PerContact<Term>,
     series_compliance_mm_per_n: PerContact<f64>,
 }
 
@@ -258,36 +180,6 @@ pub(crate) struct ToothSize {
     pub(crate) width_mm: f64,
 }
 
-/// Returns the law of one contact of a shape; none if the shape has no such contact.
-fn law_of(
-    shape: &ToothContact,
-    law: &ContactLaw,
-    materials: &Materials,
-    size: ToothSize,
-    contact: Contact,
-) -> Option<Law> {
-    let is_flat = contact == Contact::Carrier && matches!(shape, ToothContact::FlatSided { .. });
-    let is_ball = matches!(shape, ToothContact::Ball { .. });
-    Some(match law {
-        ContactLaw::Fixed(stiffness_n_per_mm) => {
-            Law::Linear { compliance_mm_per_n: 1.0 / stiffness_n_per_mm.get(contact) }
-        }
-        ContactLaw::Hertz => return is_ball.then_some(Law::Ellipse),
-        _ if is_ball => return None,
-        _ if is_flat => Law::Flat,
-        ContactLaw::Linear => {
-            let stiffness = 0.5 * PI * size.width_mm * materials.contact_modulus_mpa(contact);
-            Law::Linear { compliance_mm_per_n: 1.0 / stiffness }
-        }
-        ContactLaw::Palmgren => {
-            Law::Power { exponent: PALMGREN_EXPONENT, coefficient: 3.84e-5 / size.width_mm.powf(0.8) }
-        }
-        ContactLaw::Johnson { depth_mm } => {
-            Law::Johnson(JohnsonLine::new(materials, contact, size.radius_mm, size.width_mm, *depth_mm.get(contact)))
-        }
-    })
-}
-
 /// Returns the approach at the wave generator under a force, by a law of cylinders that does not depend on the place.
 pub(crate) fn plain_approach_mm(
     law: &ContactLaw,
@@ -296,10 +188,10 @@ pub(crate) fn plain_approach_mm(
     force_n: f64,
 ) -> Option<f64> {
     let size = ToothSize { radius_mm: 0.0, width_mm: tooth_width_mm };
-    match law_of(&ToothContact::Cylinder, law, materials, size, Contact::WaveGenerator)? {
-        Law::Linear { compliance_mm_per_n } => Some(compliance_mm_per_n * force_n),
-        Law::Power { exponent, coefficient } => Some(coefficient * force_n.powf(exponent)),
-        Law::Johnson(_) | Law::Ellipse | Law::Flat => None,
+    match law.term(&ToothContact::Cylinder, Contact::WaveGenerator, materials, size)? {
+        Term::Linear { compliance_mm_per_n } => Some(compliance_mm_per_n * force_n),
+        Term::Power { exponent, coefficient } => Some(coefficient * force_n.powf(exponent)),
+        Term::Logarithmic(_) | Term::Ellipse | Term::Flat => None,
     }
 }
 
@@ -323,7 +215,7 @@ impl Contacts {
         size: ToothSize,
         series_compliance_mm_per_n: &PerContact<f64>,
     ) -> Option<Self> {
-        let law = |contact| law_of(shape, law, materials, size, contact);
+        let law = |contact| law.term(shape, contact, materials, size);
         let laws = PerContact {
             wave_generator: law(Contact::WaveGenerator)?,
             ring: law(Contact::Ring)?,
@@ -351,17 +243,21 @@ impl Contacts {
         let series = &self.series_compliance_mm_per_n;
         let is_alone = series.iter().all(|(_, &compliance)| compliance == 0.0);
         let PerContact { wave_generator, ring, carrier } = &self.law;
+        // Other powers have no columns.
+        if matches!(wave_generator, Term::Power { exponent, .. } if exponent.total_cmp(&PALMGREN_EXPONENT).is_ne()) {
+            return None;
+        }
         match (wave_generator, ring, carrier) {
             _ if matches!(self.shape, ToothContact::Ball { .. }) => {
-                (is_alone && *wave_generator == Law::Ellipse).then_some(ToothLaw::Hertz)
+                (is_alone && *wave_generator == Term::Ellipse).then_some(ToothLaw::Hertz)
             }
             (
-                Law::Linear { compliance_mm_per_n: wave_generator },
-                Law::Linear { compliance_mm_per_n: ring },
-                carrier @ (Law::Linear { .. } | Law::Flat),
+                Term::Linear { compliance_mm_per_n: wave_generator },
+                Term::Linear { compliance_mm_per_n: ring },
+                carrier @ (Term::Linear { .. } | Term::Flat),
             ) => {
                 let carrier =
-                    if let Law::Linear { compliance_mm_per_n } = carrier { *compliance_mm_per_n } else { 0.0 };
+                    if let Term::Linear { compliance_mm_per_n } = carrier { *compliance_mm_per_n } else { 0.0 };
                 Some(ToothLaw::Linear {
                     compliance_mm_per_n: PerContact {
                         wave_generator: wave_generator + series.wave_generator,
@@ -370,19 +266,23 @@ impl Contacts {
                     },
                 })
             }
-            (&Law::Power { coefficient, .. }, Law::Power { .. }, Law::Power { .. }) if is_alone => {
+            (&Term::Power { coefficient, .. }, Term::Power { .. }, Term::Power { .. }) if is_alone => {
                 Some(ToothLaw::Palmgren { coefficient })
             }
-            (&Law::Power { coefficient, .. }, Law::Power { .. }, carrier @ (Law::Power { .. } | Law::Flat)) => {
-                let at_carrier = if *carrier == Law::Flat { 0.0 } else { coefficient };
+            (&Term::Power { coefficient, .. }, Term::Power { .. }, carrier @ (Term::Power { .. } | Term::Flat)) => {
+                let at_carrier = if *carrier == Term::Flat { 0.0 } else { coefficient };
                 Some(ToothLaw::PalmgrenAndLinear {
                     coefficient: PerContact { wave_generator: coefficient, ring: coefficient, carrier: at_carrier },
                     compliance_mm_per_n: *series,
                 })
             }
-            (&Law::Johnson(wave_generator), &Law::Johnson(ring), carrier @ (Law::Johnson(_) | Law::Flat)) => {
-                let carrier = if let Law::Johnson(line) = carrier { *line } else { JohnsonLine::NONE };
-                Some(ToothLaw::Johnson {
+            (
+                &Term::Logarithmic(wave_generator),
+                &Term::Logarithmic(ring),
+                carrier @ (Term::Logarithmic(_) | Term::Flat),
+            ) => {
+                let carrier = if let Term::Logarithmic(line) = carrier { *line } else { LogarithmicTerm::NONE };
+                Some(ToothLaw::Logarithmic {
                     law: PerContact { wave_generator, ring, carrier },
                     series_compliance_mm_per_n: *series,
                 })
@@ -391,7 +291,6 @@ impl Contacts {
         }
     }
 
-    /// Returns a contact of balls.
     pub(crate) fn ball(&self, contact: Contact) -> Option<BallContact> {
         let ToothContact::Ball { groove_radius_mm } = &self.shape else { return None };
         let r = self.tooth_radius_mm;
@@ -412,7 +311,7 @@ impl Contacts {
             carrier_inner_radius_mm,
             carrier_outer_radius_mm,
             modulus_mpa: self.modulus_mpa.carrier,
-            has_own_law: self.law.carrier == Law::Flat,
+            has_own_law: self.law.carrier == Term::Flat,
         })
     }
 
@@ -443,7 +342,7 @@ impl Contacts {
         // are positive.
         let johnson = PerContact::of(|contact| match (self.law.get(contact), &places.get(contact).pressure) {
             (
-                Law::Johnson(law),
+                Term::Logarithmic(law),
                 Pressure::Line { curvature_per_mm, .. } | Pressure::Corner(CornerContact { curvature_per_mm, .. }),
             ) => Some(law.at(*curvature_per_mm)),
             _ => None,
@@ -460,17 +359,17 @@ impl Contacts {
                 power = Some((exponent, sum + weight * (coefficient * ratio.powf(exponent))));
             };
             match (self.law.get(contact), &place.pressure) {
-                (Law::Linear { compliance_mm_per_n }, _) => linear_mm_per_n += weight * (compliance_mm_per_n * ratio),
-                (Law::Power { exponent, coefficient }, _) => add_power(*exponent, *coefficient),
-                (Law::Ellipse, Pressure::Ellipse(ellipse)) => {
+                (Term::Linear { compliance_mm_per_n }, _) => linear_mm_per_n += weight * (compliance_mm_per_n * ratio),
+                (Term::Power { exponent, coefficient }, _) => add_power(*exponent, *coefficient),
+                (Term::Ellipse, Pressure::Ellipse(ellipse)) => {
                     add_power(EllipticContact::EXPONENT, ellipse.coefficient());
                 }
-                (Law::Flat, Pressure::Flat(flat)) => {
+                (Term::Flat, Pressure::Flat(flat)) => {
                     linear_mm_per_n += weight * (flat.compliance_mm_per_n(*self.modulus_mpa.get(contact)) * ratio);
                 }
                 // A contact without a force has no approach, and a law only occurs with the pressure model of its own
                 // shape.
-                (Law::Johnson(_) | Law::Ellipse | Law::Flat, _) => {
+                (Term::Logarithmic(_) | Term::Ellipse | Term::Flat, _) => {
                     if let Some(law) = johnson.get(contact).filter(|_| ratio > 0.0) {
                         let ln = (law.reference_n / ratio / reference_n).ln();
                         linear_mm_per_n += weight * ratio * (law.compliance_mm_per_n + law.growth_mm_per_n * ln);
@@ -496,30 +395,6 @@ impl Contacts {
             Approach::Power { exponent, coefficient, compliance_mm_per_n: linear_mm_per_n }
         } else {
             Approach::Linear { compliance_mm_per_n: linear_mm_per_n }
-        }
-    }
-}
-
-impl ContactLaw {
-    /// Returns the numerical parameters of the law.
-    pub(crate) fn parameters(&self) -> Vec<(Parameter, f64)> {
-        match self {
-            Self::Linear | Self::Palmgren | Self::Hertz => Vec::new(),
-            Self::Fixed(stiffness) => {
-                stiffness.iter().map(|(contact, &value)| (Parameter::Stiffness(contact), value)).collect()
-            }
-            Self::Johnson { depth_mm } => depth_mm
-                .iter()
-                .filter_map(|(contact, depth_mm)| depth_mm.map(|value| (Parameter::Depth(contact), value)))
-                .collect(),
-        }
-    }
-
-    /// Returns true if the law can be combined with `projection`.
-    pub const fn is_of_projection(&self) -> bool {
-        match self {
-            Self::Linear | Self::Fixed(_) | Self::Palmgren => true,
-            Self::Johnson { .. } | Self::Hertz => false,
         }
     }
 }

@@ -5,11 +5,11 @@ use std::io::{self, BufRead as _, Write as _};
 use std::sync::Mutex;
 
 use heuropt::prelude::*;
-use toothwave_solver::parts::{CarrierRadii, RIM};
+use toothwave_solver::parts::RIM;
 use toothwave_solver::sweep::{Points, peaks};
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification,
-    Never, PerContact, ToothShape, Torque, WaveGenerator,
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, ToothShape, Torque,
+    WaveGenerator,
 };
 
 use crate::optimise::{Judged, Optimiser, Plan, Point};
@@ -94,23 +94,11 @@ fn drive(place: &[f64]) -> Option<Judged> {
         tip_radius_mm: None,
     };
     let load = LoadParameters {
-        materials: Materials {
-            wave_generator: Material::STEEL,
-            teeth: Material::STEEL,
-            ring: Material::STEEL,
-            carrier: Material::STEEL,
-        },
         torque: Torque::Output(200.0),
         compatibility: Compatibility::Projection,
         law: ContactLaw::Linear,
-        series_compliance_mm_per_n: PerContact::default(),
-        ring_teeth_bend: false,
-        wave_generator_moves: false,
-        corner_contact: false,
-        clearance_um: PerContact::default(),
-        modification: Modification::default(),
-        carrier: CarrierRadii::default(),
         allowable_stress_mpa: Some(PerContact { wave_generator: 1500.0, ring: 1500.0, carrier: 1500.0 }),
+        ..LoadParameters::default()
     };
     let drive = Drive::new(&parameters).ok()?;
     let load = LoadCase::new(&load).expect("a load");

@@ -36,7 +36,6 @@ impl Layout {
 pub(super) struct Listed {
     /// Index of the first of them in a row of the tile.
     pub(super) at: usize,
-    /// The teeth.
     pub(super) teeth: Neighbours,
 }
 
@@ -51,7 +50,6 @@ impl Listed {
     }
 }
 
-/// Teeth of a lap.
 #[derive(Debug, Default)]
 pub(super) struct LapTeeth {
     runs: Vec<Neighbours>,

@@ -108,7 +108,6 @@ impl Run {
         self.first + (self.end - self.first).div_ceil(self.stride) * self.stride
     }
 
-    /// Returns the number of places.
     pub(super) const fn places(&self) -> usize {
         self.places
     }
@@ -391,7 +390,6 @@ impl<'a> Tile<'a> {
         if self.stress_exponents.is_one_at(contact) { self.scale } else { self.scale_root }
     }
 
-    /// Returns the position of a state in deg.
     pub(super) fn position_deg_of(&self, state: usize) -> f64 {
         360.0 * (self.pattern_step[state] - self.passed) / self.steps
     }

@@ -1,0 +1,174 @@
+//! Reading a value from a tree, with the path of whatever is wrong.
+
+use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
+
+use super::fault::Fault;
+use super::tree::{ANY, Tree};
+
+impl Tree {
+    fn unexpected(&self) -> Unexpected<'_> {
+        match self {
+            Self::Null => Unexpected::Unit,
+            Self::Bool(value) => Unexpected::Bool(*value),
+            Self::Number(value) => Unexpected::Float(*value),
+            Self::Text(value) => Unexpected::Str(value),
+            Self::Array(_) => Unexpected::Seq,
+            Self::Object(_) => Unexpected::Map,
+        }
+    }
+}
+
+impl<'de> serde::Deserializer<'de> for &Tree {
+    type Error = Fault;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        match self {
+            Tree::Null => visitor.visit_unit(),
+            Tree::Bool(value) => visitor.visit_bool(*value),
+            Tree::Number(value) => visitor.visit_f64(*value),
+            Tree::Text(value) => visitor.visit_str(value),
+            Tree::Object(fields) => visitor.visit_map(Fields::new(fields, None)),
+            // A type that is read field by field would accept an array as its fields in order.
+            Tree::Array(_) => Err(de::Error::invalid_type(self.unexpected(), &visitor)),
+        }
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        match self {
+            Tree::Null => visitor.visit_none(),
+            _ => visitor.visit_some(self),
+        }
+    }
+
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        match self {
+            Tree::Array(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
+            _ => Err(de::Error::invalid_type(self.unexpected(), &"an array")),
+        }
+    }
+
+    /// Deserializes a word, or an object with a tag field. Enums of such objects are named `by:` and the tag, and
+    /// perhaps `=` and the default kind.
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Fault> {
+        match (self, name.strip_prefix("by:")) {
+            (Tree::Text(value), None) => visitor.visit_enum(value.as_str().into_deserializer()),
+            (Tree::Object(fields), Some(tag)) => {
+                let (tag, by_default) = tag.split_once('=').map_or((tag, None), |(tag, kind)| (tag, Some(kind)));
+                visitor.visit_enum(Union { tag, by_default, fields })
+            }
+            (_, Some(_)) => Err(de::Error::invalid_type(self.unexpected(), &"an object")),
+            _ => Err(de::Error::invalid_type(self.unexpected(), &"a word")),
+        }
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, name: &'static str, visitor: V) -> Result<V::Value, Fault> {
+        match self {
+            Tree::Array(items) if name == ANY => visitor.visit_seq(Items { items: items.iter().enumerate() }),
+            _ if name == ANY => self.deserialize_any(visitor),
+            _ => visitor.visit_newtype_struct(self),
+        }
+    }
+
+    serde::forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct tuple
+        tuple_struct map struct identifier ignored_any
+    }
+}
+
+struct Fields<'a> {
+    fields: std::slice::Iter<'a, (String, Tree)>,
+    /// Name of a field that was read already.
+    passed_over: Option<&'a str>,
+    current: Option<&'a (String, Tree)>,
+}
+
+impl<'a> Fields<'a> {
+    pub(super) fn new(fields: &'a [(String, Tree)], passed_over: Option<&'a str>) -> Self {
+        Self { fields: fields.iter(), passed_over, current: None }
+    }
+}
+
+impl<'de> MapAccess<'de> for Fields<'_> {
+    type Error = Fault;
+
+    fn next_key_seed<K: de::DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Fault> {
+        self.current = self.fields.find(|(key, _)| Some(key.as_str()) != self.passed_over);
+        self.current.map(|(key, _)| seed.deserialize(key.as_str().into_deserializer())).transpose()
+    }
+
+    fn next_value_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Fault> {
+        let Some((key, value)) = self.current else {
+            return Err(de::Error::custom("a value was read before its key"));
+        };
+        seed.deserialize(value).map_err(|fault| fault.within(key))
+    }
+}
+
+struct Items<'a> {
+    items: std::iter::Enumerate<std::slice::Iter<'a, Tree>>,
+}
+
+impl<'de> de::SeqAccess<'de> for Items<'_> {
+    type Error = Fault;
+
+    fn next_element_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Fault> {
+        let item = self.items.next();
+        item.map(|(index, node)| seed.deserialize(node).map_err(|fault| fault.within(&index.to_string()))).transpose()
+    }
+}
+
+/// An object whose kind is in one of its fields.
+#[derive(Clone, Copy)]
+struct Union<'a> {
+    tag: &'static str,
+    by_default: Option<&'static str>,
+    fields: &'a [(String, Tree)],
+}
+
+impl<'de> de::EnumAccess<'de> for Union<'_> {
+    type Error = Fault;
+    type Variant = Self;
+
+    fn variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<(S::Value, Self), Fault> {
+        let mut tags = self.fields.iter().filter(|(key, _)| key == self.tag).map(|(_, value)| value);
+        let kind = match (tags.next(), self.by_default) {
+            (Some(Tree::Text(word)), _) => word.as_str(),
+            (Some(other), _) => {
+                let fault: Fault = de::Error::invalid_type(other.unexpected(), &"a word");
+                return Err(fault.within(self.tag));
+            }
+            (None, Some(by_default)) => by_default,
+            (None, None) => return Err(de::Error::missing_field(self.tag)),
+        };
+        if tags.next().is_some() {
+            return Err(de::Error::duplicate_field(self.tag));
+        }
+        let deserializer: de::value::StrDeserializer<'_, Fault> = kind.into_deserializer();
+        Ok((seed.deserialize(deserializer).map_err(|fault| fault.within(self.tag))?, self))
+    }
+}
+
+impl<'de> de::VariantAccess<'de> for Union<'_> {
+    type Error = Fault;
+
+    fn newtype_variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, Fault> {
+        seed.deserialize(de::value::MapAccessDeserializer::new(Fields::new(self.fields, Some(self.tag))))
+    }
+
+    fn unit_variant(self) -> Result<(), Fault> {
+        Err(de::Error::invalid_type(Unexpected::Map, &"a word"))
+    }
+
+    fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, Fault> {
+        Err(de::Error::invalid_type(Unexpected::Map, &visitor))
+    }
+
+    fn struct_variant<V: Visitor<'de>>(self, _: &'static [&'static str], visitor: V) -> Result<V::Value, Fault> {
+        visitor.visit_map(Fields::new(self.fields, Some(self.tag)))
+    }
+}

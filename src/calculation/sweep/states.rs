@@ -1,0 +1,109 @@
+//! States of a sweep as columns, and as CSV.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use super::NUMBER_TEXT_BYTES;
+use crate::forms::csv_error;
+use crate::sweep::answer::SweepAnswer;
+use crate::sweep::losses::{LossesAnswer, RollsAnswer};
+
+/// Column of the states.
+#[derive(Debug, Clone, Copy)]
+pub enum Column<'a> {
+    /// Numbers.
+    Numbers(&'a [f64]),
+    /// Whole numbers.
+    Counts(&'a [u32]),
+    /// Booleans.
+    Flags(&'a [bool]),
+    /// Contacts at which teeth roll.
+    Rolls(&'a [RollsAnswer]),
+}
+
+/// Entry of a column.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Entry {
+    Number(f64),
+    Count(u32),
+    Flag(bool),
+    Rolls(RollsAnswer),
+}
+
+impl Column<'_> {
+    /// Returns the approximate length as JSON.
+    pub(super) const fn text_bytes(&self) -> usize {
+        match self {
+            Self::Numbers(numbers) => NUMBER_TEXT_BYTES * numbers.len(),
+            Self::Counts(counts) => 5 * counts.len(),
+            Self::Flags(flags) => 6 * flags.len(),
+            Self::Rolls(rolls) => 17 * rolls.len(),
+        }
+    }
+
+    const fn entry(&self, state: usize) -> Entry {
+        match self {
+            Self::Numbers(numbers) => Entry::Number(numbers[state]),
+            Self::Counts(counts) => Entry::Count(counts[state]),
+            Self::Flags(flags) => Entry::Flag(flags[state]),
+            Self::Rolls(rolls) => Entry::Rolls(rolls[state]),
+        }
+    }
+
+    pub(super) const fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::Numbers(numbers) => size_of_val(*numbers),
+            Self::Counts(counts) => size_of_val(*counts),
+            Self::Flags(flags) => size_of_val(*flags),
+            Self::Rolls(rolls) => size_of_val(*rolls),
+        };
+        bytes as u64
+    }
+}
+
+impl SweepAnswer {
+    /// Returns the columns of the states with their names in JSON; those of the slips come last.
+    pub fn columns(&self) -> Vec<(&'static str, Column<'_>)> {
+        let states = &self.states;
+        let mut columns = vec![
+            ("input_angle_deg", Column::Numbers(&states.input_angle_deg)),
+            ("tooth", Column::Counts(&states.tooth)),
+            ("position_deg", Column::Numbers(&states.position_deg)),
+            ("center_radius_mm", Column::Numbers(&states.center_radius_mm)),
+            ("wave_generator_angle_deg", Column::Numbers(&states.wave_generator_angle_deg)),
+            ("ring_angle_deg", Column::Numbers(&states.ring_angle_deg)),
+            ("force_wave_generator_n", Column::Numbers(&states.force_wave_generator_n)),
+            ("force_ring_n", Column::Numbers(&states.force_ring_n)),
+            ("force_carrier_n", Column::Numbers(&states.force_carrier_n)),
+            ("stress_wave_generator_mpa", Column::Numbers(&states.stress_wave_generator_mpa)),
+            ("stress_ring_mpa", Column::Numbers(&states.stress_ring_mpa)),
+            ("stress_carrier_mpa", Column::Numbers(&states.stress_carrier_mpa)),
+        ];
+        columns.extend(states.lobe.as_deref().map(|lobe| ("lobe", Column::Counts(lobe))));
+        columns.extend(states.loaded.as_deref().map(|loaded| ("loaded", Column::Flags(loaded))));
+        if let Some(LossesAnswer { slip_mm_per_rad: slip, rolls, .. }) = &self.losses {
+            columns.extend([
+                ("slip_wave_generator_mm_per_rad", Column::Numbers(&slip.wave_generator)),
+                ("slip_ring_mm_per_rad", Column::Numbers(&slip.ring)),
+                ("slip_carrier_mm_per_rad", Column::Numbers(&slip.carrier)),
+                ("rolls", Column::Rolls(rolls)),
+            ]);
+        }
+        columns
+    }
+
+    pub(super) fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let columns = self.columns();
+        let mut csv = csv::Writer::from_writer(writer);
+        csv.write_record(columns.iter().map(|(name, _)| name)).map_err(csv_error)?;
+        let mut row = Vec::with_capacity(columns.len());
+        for state in 0..self.states.tooth.len() {
+            row.clear();
+            row.extend(columns.iter().map(|(_, column)| column.entry(state)));
+            csv.serialize(&row).map_err(csv_error)?;
+        }
+        csv.flush()
+    }
+}

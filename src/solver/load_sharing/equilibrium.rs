@@ -1,0 +1,58 @@
+//! Equilibrium of a tooth: its forces over `F_H`, and the weights of its approaches in compatibility.
+
+use super::load::Compatibility;
+use crate::cam::ToothCenter;
+use crate::contact::PerContact;
+use crate::ring::{FlankPoint, RingFlank};
+
+/// Contribution of each contact's approach to the displacement ξ along `F_H`.
+pub(super) struct Weights(pub(super) PerContact<f64>);
+
+impl Weights {
+    pub(super) fn of(compatibility: Compatibility, sense: f64, flank: &RingFlank, center: &ToothCenter) -> Self {
+        let force_ratio = force_ratio(sense, flank, center);
+        match compatibility {
+            Compatibility::VirtualWork => Self(force_ratio),
+            // The paper's cos(γ + sβ) and s sin γ. With tan β = k tan γ the first, times F_K/F_H = cos γ/cos β, is 1 -
+            // (1 + sk) sin²γ.
+            Compatibility::Projection => {
+                let t = center.tan_pressure_angle;
+                let sin_squared = t * t / (1.0 + t * t);
+                let along_ring = 1.0 - (1.0 + sense * flank.teeth_per_wave()) * sin_squared;
+                Self(PerContact {
+                    wave_generator: 1.0,
+                    ring: along_ring / force_ratio.ring,
+                    carrier: sense * sin_squared.sqrt(),
+                })
+            }
+        }
+    }
+}
+
+/// Forces over `F_H`: 1, `F_K/F_H = cos γ/cos β`, `F_S/F_H = sin γ Z_G/U` \[1\], where `Z_G/U = k + s`.
+pub(super) fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContact<f64> {
+    let t = center.tan_pressure_angle;
+    let tan_ring = flank.teeth_per_wave() * t;
+    let cos_cam = 1.0 / (1.0 + t * t).sqrt();
+    PerContact {
+        wave_generator: 1.0,
+        ring: (1.0 + tan_ring * tan_ring).sqrt() * cos_cam,
+        carrier: t * cos_cam * (flank.teeth_per_wave() + sense),
+    }
+}
+
+/// Returns the force ratios of a tooth before the flank, `F_K/F_H = cos γ/cos β` and `F_S/F_H = cos γ (tan β + s tan
+/// γ)`. Here β is the angle of the line to the corner. Returns none if the tooth is past the corner, or if its slot
+/// would have to pull it.
+pub(super) fn force_ratio_at_corner(sense: f64, center: &ToothCenter, seen: &FlankPoint) -> Option<PerContact<f64>> {
+    let t = center.tan_pressure_angle;
+    let cos_cam = 1.0 / (1.0 + t * t).sqrt();
+    let carrier = cos_cam * (seen.tan_pressure_angle + sense * t);
+    // Both tests are needed: a tooth farther out than the corner and past it has a positive tangent again.
+    let is_before = seen.tan_pressure_angle > 0.0 && seen.cos_pressure_angle > 0.0;
+    (is_before && carrier >= 0.0).then(|| PerContact {
+        wave_generator: 1.0,
+        ring: cos_cam / seen.cos_pressure_angle,
+        carrier,
+    })
+}

@@ -1,0 +1,243 @@
+//! Peaks of a sweep, and its torque capacity.
+
+use super::states::Sweep;
+use crate::contact::{Contact, Materials, PerContact, SHEAR_DEPTH, SHEAR_SHARE, half_width_mm};
+use crate::drive::Drive;
+use crate::mesh::TeethInMesh;
+use crate::tooth::point::ShearBelow;
+use crate::tooth::{Pressure, StressExponents};
+
+/// Largest value of a column, and the state in which it occurs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+pub struct Peak {
+    /// The value, in the unit of the field that holds the peak.
+    pub value: f64,
+    /// Input angle of the state.
+    pub input_angle_deg: f64,
+    /// Position of the tooth, from the middle of its lobe.
+    pub position_deg: f64,
+}
+
+/// Peaks of a contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactPeaks {
+    /// Peak of the force, in N.
+    pub force_n: Peak,
+    /// Peak of the stress, in MPa.
+    pub stress_mpa: Peak,
+    /// Half the width of the contact in the plane of motion at the stress peak, in mm.
+    pub half_width_mm: f64,
+    /// Half the length of a contact ellipse along the axis at the stress peak, in mm.
+    pub half_length_mm: Option<f64>,
+    /// Largest shear stress below the surface at the stress peak, and its depth. None for a flat, whose edges are not
+    /// modelled.
+    pub shear: Option<PeakShear>,
+}
+
+impl ContactPeaks {
+    /// Returns the peaks of a line contact with force `force_n` at its stress peak.
+    pub(crate) fn of_line(force_peak_n: Peak, stress_peak_mpa: Peak, force_n: f64, tooth_width_mm: f64) -> Self {
+        let half_width_mm = half_width_mm(force_n, stress_peak_mpa.value, tooth_width_mm);
+        Self {
+            force_n: force_peak_n,
+            stress_mpa: stress_peak_mpa,
+            half_width_mm,
+            half_length_mm: None,
+            shear: Some(PeakShear {
+                stress_mpa: SHEAR_SHARE * stress_peak_mpa.value,
+                depth_mm: SHEAR_DEPTH * half_width_mm,
+            }),
+        }
+    }
+}
+
+impl ContactPeaks {
+    /// Returns these peaks with the data of a contact of this pressure model and force `force_n` at its stress peak.
+    pub(crate) fn of_pressure(
+        self,
+        pressure: &Pressure,
+        force_n: f64,
+        materials: &Materials,
+        contact: Contact,
+    ) -> Self {
+        match pressure {
+            Pressure::Line { .. } | Pressure::Corner(_) => self,
+            Pressure::Flat(flat) => Self { half_width_mm: 0.5 * flat.length_mm(), shear: None, ..self },
+            Pressure::Ellipse(ellipse) => {
+                let half_width_mm = ellipse.half_width_mm(force_n);
+                let half_length_mm = ellipse.half_length_mm(force_n);
+                let shear = |poissons_ratio: f64| {
+                    let ShearBelow { share, depth } = ellipse.shear_below(poissons_ratio);
+                    PeakShear {
+                        stress_mpa: share * self.stress_mpa.value,
+                        depth_mm: depth * half_width_mm.min(half_length_mm),
+                    }
+                };
+                // The larger of the values in the two bodies.
+                let [tooth, partner] = [&materials.teeth, materials.partner(contact)].map(|body| body.poissons_ratio);
+                let (of_tooth, are_alike) = (shear(tooth), partner.to_bits() == tooth.to_bits());
+                let of_partner = if are_alike { of_tooth } else { shear(partner) };
+                let shear = if of_partner.stress_mpa > of_tooth.stress_mpa { of_partner } else { of_tooth };
+                Self { half_width_mm, half_length_mm: Some(half_length_mm), shear: Some(shear), ..self }
+            }
+        }
+    }
+}
+
+/// Largest shear stress below the surface of a contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PeakShear {
+    /// Shear stress, in MPa.
+    pub stress_mpa: f64,
+    /// Depth below the surface, in mm.
+    pub depth_mm: f64,
+}
+
+/// Torque capacity and the contact that limits it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+pub struct TorqueCapacity {
+    /// Largest torque at the wave generator under which no contact exceeds its allowable stress, in N·m.
+    pub input_torque_nm: f64,
+    /// The corresponding torque at the carrier, in N·m.
+    pub output_torque_nm: f64,
+    /// The contact that limits it; where `turns_past_teeth`, the one that is nearest to its allowable stress.
+    #[cfg_attr(feature = "document", serde(rename = "limited_by"))]
+    pub contact: Contact,
+    /// True if no contact reaches its allowable stress under any torque that the teeth carry. Beyond this torque the wave
+    /// generator would turn past its teeth.
+    /// Left out where it does not.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "std::ops::Not::not"))]
+    pub turns_past_teeth: bool,
+    /// The input angle where it is so.
+    pub input_angle_deg: f64,
+}
+
+impl TorqueCapacity {
+    /// Returns the capacity if all loads are proportional: for line contacts `M0 min (σ_a/σ)²`.
+    pub(crate) fn in_proportion(
+        drive: &Drive,
+        input_torque_nm: f64,
+        allowable_mpa: &PerContact<f64>,
+        peaks: &PerContact<ContactPeaks>,
+        stress_exponents: StressExponents,
+    ) -> Self {
+        let share_of = |contact| {
+            stress_exponents.raised_at(contact, allowable_mpa.get(contact) / peaks.get(contact).stress_mpa.value)
+        };
+        let (contact, share) = [Contact::Ring, Contact::Carrier]
+            .map(|contact| (contact, share_of(contact)))
+            .into_iter()
+            .fold((Contact::WaveGenerator, share_of(Contact::WaveGenerator)), |least, other| {
+                if other.1 < least.1 { other } else { least }
+            });
+        let peak = peaks.get(contact).stress_mpa;
+        let input_torque_nm = input_torque_nm * share;
+        let output_torque_nm = input_torque_nm * drive.teeth_per_wave();
+        let input_angle_deg = peak.input_angle_deg;
+        Self { input_torque_nm, output_torque_nm, contact, turns_past_teeth: false, input_angle_deg }
+    }
+}
+
+/// Summary of a sweep without its states, for searches over millions of drives.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct SweepPeaks {
+    /// Peaks over the states.
+    pub contacts: PerContact<ContactPeaks>,
+    /// Range of the wind-up `Δφ` over the input angles, in deg.
+    pub wind_up_deg: Extremes,
+    /// Range of the output torsional stiffness over the input angles.
+    pub torsional_stiffness_nm_per_rad: Extremes,
+    /// Number of listed teeth that carry load.
+    pub loaded_teeth: TeethInMesh,
+    /// The torque capacity, given an allowable stress.
+    pub torque_capacity: Option<TorqueCapacity>,
+    /// Largest relative deviation of the input, ring and carrier torques from `M0`, `M0 Z_K/U`, `M0 Z_G/U`.
+    pub torque_balance_residual: f64,
+}
+
+/// Least and largest value of a column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extremes {
+    /// Least value.
+    pub least: f64,
+    /// Largest value.
+    pub largest: f64,
+}
+
+impl Extremes {
+    /// Extremes of no values.
+    pub(crate) const NONE: Self = Self { least: f64::INFINITY, largest: f64::NEG_INFINITY };
+
+    /// Returns the extremes of a column.
+    pub fn of(column: &[f64]) -> Self {
+        column.iter().fold(Self::NONE, |seen, &value| seen.with(value))
+    }
+
+    #[inline(always)]
+    pub(crate) fn with(self, value: f64) -> Self {
+        Self { least: self.least.min(value), largest: self.largest.max(value) }
+    }
+}
+
+/// Running extremes over the input angles so far.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct AngleExtremes {
+    wind_up_deg: Extremes,
+    torsional_stiffness_nm_per_rad: Extremes,
+    loaded_teeth: Option<TeethInMesh>,
+}
+
+impl AngleExtremes {
+    pub(crate) const NONE: Self =
+        Self { wind_up_deg: Extremes::NONE, torsional_stiffness_nm_per_rad: Extremes::NONE, loaded_teeth: None };
+
+    /// Adds an input angle.
+    #[inline(always)]
+    pub(crate) fn see(&mut self, wind_up_deg: f64, torsional_stiffness_nm_per_rad: f64, loaded_teeth: u64) {
+        self.wind_up_deg = self.wind_up_deg.with(wind_up_deg);
+        self.torsional_stiffness_nm_per_rad = self.torsional_stiffness_nm_per_rad.with(torsional_stiffness_nm_per_rad);
+        let TeethInMesh { min, max } =
+            self.loaded_teeth.unwrap_or(TeethInMesh { min: loaded_teeth, max: loaded_teeth });
+        self.loaded_teeth = Some(TeethInMesh { min: min.min(loaded_teeth), max: max.max(loaded_teeth) });
+    }
+
+    /// Returns the summary, given the peaks of each contact.
+    pub(crate) fn peaks(
+        self,
+        contacts: PerContact<ContactPeaks>,
+        torque_capacity: Option<TorqueCapacity>,
+        torque_balance_residual: f64,
+    ) -> SweepPeaks {
+        SweepPeaks {
+            contacts,
+            wind_up_deg: self.wind_up_deg,
+            torsional_stiffness_nm_per_rad: self.torsional_stiffness_nm_per_rad,
+            loaded_teeth: self.loaded_teeth.unwrap_or(TeethInMesh { min: 0, max: 0 }),
+            torque_capacity,
+            torque_balance_residual,
+        }
+    }
+}
+
+impl SweepPeaks {
+    /// Returns the transmission error under load, peak to peak: the range of the wind-up, referred to the output.
+    pub fn transmission_error_peak_to_peak_deg(&self, drive: &Drive) -> f64 {
+        (self.wind_up_deg.largest - self.wind_up_deg.least) / drive.teeth_per_wave()
+    }
+}
+
+impl From<&Sweep> for SweepPeaks {
+    fn from(sweep: &Sweep) -> Self {
+        Self {
+            contacts: sweep.peaks,
+            wind_up_deg: Extremes::of(&sweep.input_angles.wind_up_deg),
+            torsional_stiffness_nm_per_rad: Extremes::of(&sweep.input_angles.torsional_stiffness_nm_per_rad),
+            loaded_teeth: sweep.loaded_teeth(),
+            torque_capacity: sweep.torque_capacity,
+            torque_balance_residual: sweep.torque_balance_residual,
+        }
+    }
+}

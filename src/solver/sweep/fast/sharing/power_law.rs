@@ -1,0 +1,378 @@
+//! Sharing among springs of one power law: closed form without gaps, tangents beyond them.
+
+use pulp::Simd;
+
+use super::{
+    LAST_ROTATION_STEP, Limit, MAX_ROUNDS, NOTHING, OPEN_TORQUE, Shared, Teeth, Weights, Work, forces_at_stress,
+    last_below, last_of, least_torque, start_above, turn_to_limit,
+};
+use crate::contact::PerContact;
+use crate::contact_law::PALMGREN_EXPONENT;
+use crate::sweep::fast::lanes::{cube_root, inverse_tenth_root, ninth_root, repeat_each};
+use crate::tooth::point::EllipticContact;
+
+/// Power law `ξ = c F^p`.
+pub(crate) struct PowerLaw<P> {
+    pub(super) power: P,
+    pub(super) has_gaps: bool,
+}
+
+/// Operations of a power law on a column.
+pub(crate) trait Power {
+    /// True if p is 1.
+    const IS_LINEAR: bool;
+
+    /// `p`.
+    fn exponent(&self) -> f64;
+
+    /// `x^p`, x not negative.
+    fn power<V: Simd>(&self, x: f64) -> f64;
+
+    /// `x^(1/p)`.
+    fn inverse<V: Simd>(&self, x: f64) -> f64;
+
+    /// `x^(1/p - 1)`.
+    fn inverse_over_x<V: Simd>(&self, x: f64) -> f64;
+
+    /// Computes the force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`, part of which may be
+    /// given.
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]);
+}
+
+/// A linear law with gaps, or for flat-sided teeth, whose compliance is given.
+pub(crate) struct Linear {
+    pub(super) compliance_mm_per_n: PerContact<f64>,
+    pub(super) weights: Weights,
+}
+
+impl Power for Linear {
+    const IS_LINEAR: bool = true;
+
+    #[inline(always)]
+    fn exponent(&self) -> f64 {
+        1.0
+    }
+
+    #[inline(always)]
+    fn power<V: Simd>(&self, x: f64) -> f64 {
+        x
+    }
+
+    #[inline(always)]
+    fn inverse<V: Simd>(&self, x: f64) -> f64 {
+        x
+    }
+
+    #[inline(always)]
+    fn inverse_over_x<V: Simd>(&self, _: f64) -> f64 {
+        1.0
+    }
+
+    #[inline(always)]
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]) {
+        let len = teeth.len;
+        let (unit, given) = (&mut unit[..len], &given[..len]);
+        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+        let Self { compliance_mm_per_n: compliance, weights } = self;
+        for i in 0..len {
+            let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
+            let ring = if weights.ring_exponent > 0.0 { ring[i] * ring[i] } else { 1.0 };
+            let of_ring = compliance.ring * along * ring;
+            let of_carrier = (compliance.carrier + given[i]) * weights.carrier;
+            let c = compliance.wave_generator + of_ring + of_carrier * (carrier[i] * carrier[i]);
+            unit[i] = arm[i] / c;
+        }
+    }
+}
+
+/// Palmgren's law, `p = 9/10`.
+pub(crate) struct Palmgren {
+    pub(super) coefficient: f64,
+    pub(super) weights: Weights,
+}
+
+/// Returns the number, or a tiny positive one if it is not positive: roots need positive arguments.
+#[inline(always)]
+pub(super) fn positive(x: f64) -> f64 {
+    if x > NOTHING { x } else { NOTHING }
+}
+
+impl Power for Palmgren {
+    const IS_LINEAR: bool = false;
+
+    #[inline(always)]
+    fn exponent(&self) -> f64 {
+        PALMGREN_EXPONENT
+    }
+
+    #[inline(always)]
+    fn power<V: Simd>(&self, x: f64) -> f64 {
+        x * inverse_tenth_root::<V>(positive(x))
+    }
+
+    #[inline(always)]
+    fn inverse<V: Simd>(&self, x: f64) -> f64 {
+        x * ninth_root::<V>(positive(x))
+    }
+
+    #[inline(always)]
+    fn inverse_over_x<V: Simd>(&self, x: f64) -> f64 {
+        ninth_root::<V>(positive(x))
+    }
+
+    /// Uses `F_K/F_H` to the power 1.9 by virtual work and -0.1 by projection, and `F_S/F_H` to the power 1.9.
+    #[inline(always)]
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, _: &[f64], unit: &mut [f64]) {
+        let len = teeth.len;
+        let unit = &mut unit[..len];
+        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+        let Self { coefficient, weights } = self;
+        let of_carrier = coefficient * weights.carrier;
+        for i in 0..len {
+            let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
+            let squared = if weights.ring_exponent > 0.0 { ring[i] * ring[i] } else { 1.0 };
+            let of_ring = coefficient * along * squared * inverse_tenth_root::<V>(ring[i]);
+            let power = carrier[i] * carrier[i] * inverse_tenth_root::<V>(positive(carrier[i]));
+            unit[i] = self.inverse::<V>(arm[i] / (coefficient + of_ring + of_carrier * power));
+        }
+    }
+}
+
+/// Hertz's law of balls. Its coefficient varies with the place, and c is given.
+pub(crate) struct Hertz;
+
+impl Power for Hertz {
+    const IS_LINEAR: bool = false;
+
+    #[inline(always)]
+    fn exponent(&self) -> f64 {
+        EllipticContact::EXPONENT
+    }
+
+    #[inline(always)]
+    fn power<V: Simd>(&self, x: f64) -> f64 {
+        let root = cube_root::<V>(x);
+        root * root
+    }
+
+    #[inline(always)]
+    fn inverse<V: Simd>(&self, x: f64) -> f64 {
+        x * x.sqrt()
+    }
+
+    #[inline(always)]
+    fn inverse_over_x<V: Simd>(&self, x: f64) -> f64 {
+        x.sqrt()
+    }
+
+    #[inline(always)]
+    fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]) {
+        let len = teeth.len;
+        let (arm, given, unit) = (&teeth.arm[..len], &given[..len], &mut unit[..len]);
+        for i in 0..len {
+            unit[i] = self.inverse::<V>(arm[i] / given[i]);
+        }
+    }
+}
+
+impl<P: Power> PowerLaw<P> {
+    #[inline(always)]
+    pub(super) fn limit<V: Simd>(
+        &self,
+        per_allowable: &PerContact<f64>,
+        teeth: &Teeth<'_>,
+        work: &mut Work<'_>,
+    ) -> Option<Limit> {
+        let len = teeth.len;
+        forces_at_stress(per_allowable, teeth, work.limit);
+        {
+            let (force, unit, arm) = (&work.limit[..len], &work.unit[..len], &teeth.arm[..len]);
+            let pressed = &mut work.pressed[..len];
+            for i in 0..len {
+                let by_law = self.power.power::<V>(force[i] / if arm[i] > 0.0 { unit[i] } else { 1.0 });
+                pressed[i] = if arm[i] > 0.0 { by_law } else { f64::INFINITY };
+            }
+        }
+        if !turn_to_limit(teeth, work) {
+            return None;
+        }
+        let limit = std::mem::take(&mut work.limit);
+        let (pressed, unit, force) = (&work.pressed[..len], &work.unit[..len], &mut limit[..len]);
+        for i in 0..len {
+            let by_law = self.power.inverse::<V>(pressed[i]);
+            force[i] = if pressed[i] > 0.0 { unit[i] * by_law } else { 0.0 };
+        }
+        let least = least_torque(per_allowable, teeth, work, limit);
+        work.limit = limit;
+        least
+    }
+
+    #[inline(always)]
+    pub(super) fn share<V: Simd>(
+        &self,
+        torque_nmm: f64,
+        teeth: &Teeth<'_>,
+        work: &mut Work<'_>,
+        shared: &mut Shared<'_>,
+    ) -> bool {
+        if !self.has_gaps {
+            self.share_in_proportion::<V>(torque_nmm, teeth, work, shared);
+            true
+        } else if P::IS_LINEAR {
+            share_linearly(torque_nmm, teeth, work, shared)
+        } else {
+            self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
+        }
+    }
+
+    /// Shares the load without gaps: the forces of all rotations are proportional.
+    #[inline(always)]
+    fn share_in_proportion<V: Simd>(
+        &self,
+        torque_nmm: f64,
+        teeth: &Teeth<'_>,
+        work: &Work<'_>,
+        shared: &mut Shared<'_>,
+    ) {
+        for row in 0..teeth.rows {
+            let at = row * teeth.count..(row + 1) * teeth.count;
+            let (arm, unit) = (&teeth.arm[at.clone()], &work.unit[at.clone()]);
+            let mut of_unit = 0.0;
+            for i in 0..teeth.count {
+                of_unit += arm[i] * unit[i];
+            }
+            let share = torque_nmm / of_unit;
+            let rotation_rad = self.power.power::<V>(share);
+            shared.rotation_rad[row] = rotation_rad;
+            shared.stiffness[row] = torque_nmm / (self.power.exponent() * rotation_rad);
+            for (force, unit) in shared.force[at].iter_mut().zip(unit) {
+                *force = unit * share;
+            }
+        }
+    }
+
+    /// Newton's method from above, with the tangents of all forces.
+    #[inline(always)]
+    fn share_beyond_gaps<V: Simd>(
+        &self,
+        torque_nmm: f64,
+        teeth: &Teeth<'_>,
+        work: &mut Work<'_>,
+        shared: &mut Shared<'_>,
+    ) -> bool {
+        let (count, inverse) = (teeth.count, 1.0 / self.power.exponent());
+        for row in 0..teeth.rows {
+            let at = row * count..(row + 1) * count;
+            let (arm, unit) = (&teeth.arm[at.clone()], &work.unit[at.clone()]);
+            let mut of_unit = 0.0;
+            for i in 0..count {
+                of_unit += arm[i] * unit[i];
+            }
+            let alone = self.power.power::<V>(torque_nmm / of_unit);
+            let Some((last, excess)) = start_above(alone, |i| arm[i] * unit[i], &work.closing[at]) else {
+                return false;
+            };
+            (work.row_last[row], work.row_excess[row]) = (last, excess);
+        }
+        let mut is_last_round = false;
+        for _ in 0..MAX_ROUNDS {
+            self.tangents::<V>(teeth, work);
+            let mut is_done = true;
+            for row in 0..teeth.rows {
+                let at = row * count..(row + 1) * count;
+                let (slope, arm) = (&work.slope[at.clone()], &teeth.arm[at.clone()]);
+                let pressed = &work.pressed[at.clone()];
+                let (mut torque, mut stiffness) = (0.0, 0.0);
+                for i in 0..count {
+                    let tangent = arm[i] * slope[i];
+                    stiffness += tangent;
+                    torque += if pressed[i] > 0.0 { tangent * pressed[i] } else { 0.0 };
+                }
+                let stiffness = inverse * stiffness;
+                shared.stiffness[row] = stiffness;
+                if is_last_round {
+                    continue;
+                }
+                let off = torque - torque_nmm;
+                let (last, step) = (work.row_last[row], off / stiffness);
+                let excess = work.row_excess[row] - step;
+                is_done &= step.abs() <= LAST_ROTATION_STEP * excess || off.abs() <= OPEN_TORQUE * torque_nmm;
+                (work.row_last[row], work.row_excess[row]) = if excess > 0.0 {
+                    (last, excess)
+                } else {
+                    is_done = false;
+                    let carrying = last_below(&work.closing[at], last, excess);
+                    (carrying, excess + (last - carrying))
+                };
+            }
+            if is_last_round {
+                for row in 0..teeth.rows {
+                    shared.rotation_rad[row] = work.row_last[row] + work.row_excess[row];
+                }
+                let len = teeth.len;
+                let (pressed, slope) = (&work.pressed[..len], &work.slope[..len]);
+                let force = &mut shared.force[..len];
+                for i in 0..len {
+                    force[i] = if pressed[i] > 0.0 { pressed[i] * slope[i] } else { 0.0 };
+                }
+                return shared.rotation_rad[..teeth.rows].iter().all(|rotation| rotation.is_finite());
+            }
+            is_last_round = is_done;
+        }
+        false
+    }
+
+    /// Computes `F/(Δφ - θ)` of the loaded teeth, which is p times the slope.
+    #[inline(always)]
+    pub(super) fn tangents<V: Simd>(&self, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+        let rows = teeth.rows;
+        repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
+        repeat_each(&work.row_last[..rows], teeth.count, work.last);
+        let len = teeth.len;
+        let (unit, closing, excess, last) =
+            (&work.unit[..len], &work.closing[..len], &work.excess[..len], &work.last[..len]);
+        let (pressed, slope) = (&mut work.pressed[..len], &mut work.slope[..len]);
+        for i in 0..len {
+            let x = excess[i] + (last[i] - closing[i]);
+            pressed[i] = x;
+            let over_x = self.power.inverse_over_x::<V>(x);
+            slope[i] = if x > 0.0 { unit[i] * over_x } else { 0.0 };
+        }
+    }
+}
+
+/// Newton's method that starts with all teeth carrying. With a linear law it ends when the set of carrying teeth is
+/// constant.
+#[inline(always)]
+fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
+    for row in 0..teeth.rows {
+        let at = row * teeth.count..(row + 1) * teeth.count;
+        let (arm, unit, closing) = (&teeth.arm[at.clone()], &work.unit[at.clone()], &work.closing[at.clone()]);
+        let mut last = last_of(closing);
+        let (stiffness, excess) = loop {
+            let (mut stiffness, mut before) = (0.0, 0.0);
+            for i in 0..teeth.count {
+                let of_tooth = arm[i] * unit[i];
+                stiffness += if closing[i] <= last { of_tooth } else { 0.0 };
+                before += if closing[i] <= last { of_tooth * (last - closing[i]) } else { 0.0 };
+            }
+            let excess = (torque_nmm - before) / stiffness;
+            if excess > 0.0 {
+                break (stiffness, excess);
+            }
+            // The number falls each time: the last tooth is open.
+            last = last_below(closing, last, excess);
+            if !last.is_finite() || excess.is_nan() {
+                return false;
+            }
+        };
+        (work.row_last[row], work.row_excess[row]) = (last, excess);
+        shared.rotation_rad[row] = last + excess;
+        shared.stiffness[row] = stiffness;
+        for (force, (unit, closing)) in shared.force[at].iter_mut().zip(unit.iter().zip(closing)) {
+            let pressed = excess + (last - closing);
+            *force = if pressed > 0.0 { unit * pressed } else { 0.0 };
+        }
+    }
+    true
+}
