@@ -1,13 +1,14 @@
 // One tooth's pass through the meshing zone, from where it enters to the root, put together from the samples of one period
 // as the paper does it (its figures 8 to 10): each loaded tooth stands for a part of the pass.
 
+import { t } from './texts.js';
 import { CONTACTS, LOADS, between, enteringBetween, framesOf, lobesOf, rubbingScale } from './motion.js';
 
 export const ABSCISSAE = [
-  { key: 'input', label: 'Input angle', axis: 'input angle since the valley, Δj, deg', unit: 'deg', symbol: 'Δj' },
-  { key: 'ring', label: 'Ring flank', axis: 'φ_K on the ring, from the tooth tip, deg', unit: 'deg', symbol: 'φ_K' },
-  { key: 'cam', label: 'Cam', axis: 'φ_H on the cam, from the valley, deg', unit: 'deg', symbol: 'φ_H' },
-  { key: 'slot', label: 'Slot', axis: 'distance of the tooth’s centre from the axis, mm', unit: 'mm', symbol: 'ρ' },
+  { key: 'input', label: t('abscissa.input'), axis: t('abscissa.input_axis'), unit: 'deg', symbol: 'Δj' },
+  { key: 'ring', label: t('abscissa.ring'), axis: t('abscissa.ring_axis'), unit: 'deg', symbol: 'φ_K' },
+  { key: 'cam', label: t('abscissa.cam'), axis: t('abscissa.cam_axis'), unit: 'deg', symbol: 'φ_H' },
+  { key: 'slot', label: t('abscissa.slot'), axis: t('abscissa.slot_axis'), unit: 'mm', symbol: 'ρ' },
 ];
 
 /** Positions closer than this are one and the same, on both sides of a jump. */
