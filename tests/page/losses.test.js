@@ -25,8 +25,8 @@ test('losses of three bearings are compared and applied', async () => {
   assert.deepEqual(rows.map(({ kind }) => kind), ['plain', 'race', 'rolling']);
   const [plain, race, rolling] = rows.map(({ efficiency }) => efficiency);
   assert.ok(plain < 0.55 && race > 0.85 && rolling > race, JSON.stringify(rows));
-  assert.match(rows[0].text, /locks itself/);
-  assert.match(await page.textContent('#losses-table caption'), /taken for the comparison.*0\.05.*0\.002/);
+  assert.match(rows[0].text, /self-locking/);
+  assert.match(await page.textContent('#losses-table caption'), /usual coefficients.*0\.05.*0\.002/);
   // The design does not change until a row is chosen.
   assert.equal((await designOf(page)).friction, undefined);
   assert.ok(await page.isHidden('#key-figures .tile:has-text("Efficiency")'));
@@ -34,7 +34,7 @@ test('losses of three bearings are compared and applied', async () => {
   await settled(page);
   assert.equal((await designOf(page)).friction.wave_generator.kind, 'race');
   near(await resultOf(page, 'Efficiency, ring fixed'), 100 * race, 'the row is the design');
-  assert.match(await page.textContent('#key-figures .tile:has-text("Efficiency")'), /ring fixed; .* from behind/);
+  assert.match(await page.textContent('#key-figures .tile:has-text("Efficiency")'), /ring fixed; .* back-driven/);
   assert.equal(await page.getAttribute('#losses-table tr[data-kind="race"] button', 'aria-pressed'), 'true');
   await page.click('#compare-losses');
   await page.waitForFunction(() => document.querySelector('#losses-state').textContent === '');
@@ -133,7 +133,7 @@ test('each line of a duty is one load', async () => {
   const alone = (await bed.server.answers({ ...(await designOf(page)), load: { input_torque_nm: 40 } })).sweep;
   assert.equal(await resultOf(page, 'Force, ring'), alone.peaks.ring.force_n.value, 'the peaks are those of the hardest');
   await page.fill(field('/load/duty'), '10 1500');
-  assert.match(await page.textContent(notes('/load/duty')), /Line 1 wants 3 numbers/);
+  assert.match(await page.textContent(notes('/load/duty')), /Line 1 needs 3 numbers/);
   await page.fill(field('/load/duty'), '10 1500 60');
   await settled(page);
   assert.match(await page.textContent(notes('/load/duty')), /add up to 0\.6/);

@@ -1181,7 +1181,8 @@ test('long report has two readable pages with every finding', async () => {
     for (const { code } of findings) codes.add(code);
     assert.equal(await pagesOfReport(), 2, `${findings.length} findings`);
     const { table, parts, clearances, wanted, tooSmall, tooWide } = await onPaper(async (found) => {
-      const { kindOf, readable, sentence } = await import('/page/findings.js');
+      const { kindOf } = await import('/page/findings.js');
+      const { findingInWords, sentence } = await import('/page/words.js');
       const { number, withUnit } = await import('/page/format.js');
       const small = [];
       const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT, (node) =>
@@ -1199,7 +1200,7 @@ test('long report has two readable pages with every finding', async () => {
           kindOf(finding),
           withUnit(number(finding.value, 5), finding.unit),
           withUnit(number(finding.limit, 5), finding.unit),
-          sentence(readable(finding.advice)),
+          sentence(findingInWords(finding).advice),
         ]),
         tooSmall: small,
         tooWide: [...document.querySelectorAll('table')].filter((candidate) => candidate.getBoundingClientRect().right > innerWidth).map(({ id }) => id),

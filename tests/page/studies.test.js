@@ -306,7 +306,7 @@ test('reasons of failed drives are counted', async () => {
   const page = await bed.open();
   await find(page);
   const reasons = page.locator('#find [aria-labelledby="reasons-title"]');
-  assert.match(await reasons.textContent(), /Before the search \d.* variants were spread evenly over all that is free/);
+  assert.match(await reasons.textContent(), /Before the search \d.* variants were spread evenly over the free numbers/);
   const rows = await reasons.locator('tbody tr').allTextContents();
   assert.ok(rows.some((row) => /^Torque capacity, output at least 200.N·m/.test(row)), rows.join('\n'));
   assert.match(await reasons.locator('details').first().textContent(), /such as: /);
