@@ -9,7 +9,7 @@ import { SERVICE, t } from './texts.js';
 const FIRST_DRIVE = 'paper-5.1';
 
 /** A title without what its colon leads to. */
-export const shortTitle = (title) => title.split(/[::]/)[0];
+export const shortTitle = (title) => title.split(/[:\uff1a]/)[0];
 
 export class Examples {
   #all = [];
