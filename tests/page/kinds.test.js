@@ -489,7 +489,7 @@ test('nominal picture says so and links to drawings', async () => {
   assert.equal(await page.getAttribute('#whole .part-ring', 'd'), outline);
   assert.ok(await told.isHidden());
   await setDocument(page, { ...made, parts: { ring: { clearance_um: 10 } }, deviations: { ring_runout: { amount_um: 2 } } });
-  assert.equal(await told.textContent(), 'The picture is the nominal drive. The drawings show the modification and clearances, of micrometres, true to size. The deviations are in the numbers alone.');
+  assert.equal(await told.textContent(), 'The picture is the nominal drive. The drawings show the modification and clearances, of micrometres, true to size. The deviations affect only the numbers.');
   await told.locator('button').click();
   assert.ok(await page.isVisible('#downloads'));
 });

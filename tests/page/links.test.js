@@ -101,7 +101,7 @@ test('file without design is shown with the reason', async () => {
   const page = await bed.open();
   await page.setInputFiles('#document-file', { name: 'broken.json', mimeType: 'application/json', buffer: Buffer.from('{ "drive": ') });
   await page.waitForSelector('#document-error:not([hidden])');
-  assert.match(await page.textContent('#document-error'), /no JSON/);
+  assert.match(await page.textContent('#document-error'), /not JSON/);
   assert.equal(await page.inputValue('#document-text'), '{ "drive": ');
 });
 

@@ -86,8 +86,8 @@ test('results, plot, table and colours match the service', async () => {
   await setDocument(page, design);
   const { losses, states } = (await bed.server.answers(design)).sweep;
   near(await resultOf(page, 'Efficiency, ring fixed'), 100 * losses.efficiency.ring_fixed, 'efficiency');
-  near(await resultOf(page, 'Power lost'), losses.power_loss_w, 'power');
-  near(await resultOf(page, 'Of it at the cam or race'), (100 * losses.loss_ratio_by_place.wave_generator) / losses.loss_ratio, 'share');
+  near(await resultOf(page, 'Power loss'), losses.power_loss_w, 'power');
+  near(await resultOf(page, 'Share lost at the cam or race'), (100 * losses.loss_ratio_by_place.wave_generator) / losses.loss_ratio, 'share');
   near(await resultOf(page, 'Pressure times velocity, carrier'), losses.pressure_velocity_mpa_m_per_s.carrier.value, 'p·v');
   near(await resultOf(page, 'Wear, wave generator'), 1000 * losses.wear_mm_per_hour.wave_generator.value, 'wear');
   assert.ok(await page.isVisible('#charts figure:has-text("Pressure times velocity")'));
@@ -113,7 +113,7 @@ test('results, plot, table and colours match the service', async () => {
   await enter(page, '/load/input_speed_rpm', '');
   assert.ok(await page.isHidden('#charts figure:has-text("Pressure times velocity")'));
   assert.match(await page.textContent('#legend'), /highest contact stress/);
-  assert.equal(await resultOf(page, 'Power lost'), undefined);
+  assert.equal(await resultOf(page, 'Power loss'), undefined);
 });
 
 test('each line of a duty is one load', async () => {

@@ -68,7 +68,7 @@ const PAGE = {
     file: 'Design document file',
     apply: 'Apply',
     copy: 'Copy',
-    no_json: 'This is no JSON: {fault}',
+    no_json: 'This is not JSON: {fault}',
     no_object: 'A design document is a JSON object; this is another value.',
   },
   login: {
@@ -108,7 +108,7 @@ const PAGE = {
   },
   status: {
     waiting: 'Waiting for the calculation service…',
-    slow: 'Calculating for {seconds} s; numbers are the last design’s.',
+    slow: 'Calculating for {seconds} s. The numbers are those of the last design.',
     no_findings: 'No findings',
     findings: { one: '1 finding', many: '{count} findings' },
     geometry_only: 'Geometry is shown; forces are not.',
@@ -159,7 +159,7 @@ const PAGE = {
     modification: 'modification',
     clearances: 'clearances',
     drawings: 'drawings',
-    undrawn: 'The deviations are in the numbers alone.',
+    undrawn: 'The deviations affect only the numbers.',
   },
   teeth: { title: 'Loaded teeth at this input angle, as a table', table: 'Table of loaded teeth', tooth: 'Tooth' },
   plot: {
@@ -195,7 +195,7 @@ const PAGE = {
   },
   losses: {
     title: 'Plain cam, race or bearing',
-    intro: 'Friction losses of this drive with its teeth on a plain cam, on a race with a bearing, and on a race without friction at the teeth. A row applies its choice.',
+    intro: 'Friction losses of this drive for three kinds of wave generator: a plain cam, a race with a bearing, and a race without friction at the teeth. A row applies its choice.',
     compare: 'Compare',
     compare_again: 'Compare again',
     comparing: 'Comparing…',
@@ -207,15 +207,15 @@ const PAGE = {
     use: '{name}: use it',
     efficiency: 'Efficiency, ring fixed',
     back_driven: 'Back-driven',
-    power: 'Power lost',
+    power: 'Power loss',
     at: { wave_generator: 'Lost at the cam or race', ring: 'Lost at the ring', carrier: 'Lost at the slots', bearing: 'Lost at the bearing' },
-    with_own: 'With this design’s coefficients, and usual ones where it has none: {wave_generator} at the wave generator, {ring} at the ring, {carrier} in the slots, and {bearing} of the bearing at {radius} mm.',
-    with_usual: 'With usual coefficients, since the design has none: {wave_generator} at the wave generator, {ring} at the ring, {carrier} in the slots, and {bearing} of the bearing at {radius} mm.',
+    with_own: 'With this design’s coefficients, and usual values for missing ones: {wave_generator} at the wave generator, {ring} at the ring, {carrier} in the slots, and {bearing} of the bearing at {radius} mm.',
+    with_usual: 'With usual coefficients, because the design has none: {wave_generator} at the wave generator, {ring} at the ring, {carrier} in the slots, and {bearing} of the bearing at {radius} mm.',
   },
   accuracy: {
     title: 'Accuracy',
     intro: 'Error and computing time of each model and choice of input angles for this design. A row applies its choice.',
-    wanted: 'Error wanted',
+    wanted: 'Target error',
     measure: 'Measure',
     measure_again: 'Measure again',
     measuring: 'Measuring…',
@@ -247,7 +247,7 @@ const PAGE = {
     here: 'Here',
     limit: 'Limit',
   },
-  definition: { label: 'What is meant: {names}' },
+  definition: { label: 'Definition: {names}' },
   help: {
     find: '“Find a drive” searches for drives that meet your requirements. Or begin with an example, or open a file.',
     slider: 'A slider or a number changes the design. The page says at the field what is wrong.',
@@ -266,7 +266,7 @@ const PAGE = {
     },
     position: {
       title: 'Position ψ',
-      text: 'Where a tooth stands, as the angle from the middle of a lobe of the wave generator, of an ellipse its major axis. At ψ = 0° it is pushed out farthest, into the root of the ring; it enters the ring’s flank at ψ_e, at most in the valley between two lobes, which an ellipse has at 90°.',
+      text: 'The place of a tooth, as the angle from the middle of a lobe of the wave generator (of an ellipse: its major axis). At ψ = 0° the tooth is pushed out farthest, into the root of the ring. It enters the ring’s flank at ψ_e, at the latest in the valley between two lobes, at 90° for an ellipse.',
     },
     lobes: {
       title: 'Lobes U',
@@ -286,7 +286,7 @@ const PAGE = {
     },
     race: {
       title: 'Race',
-      text: 'A ring around the cam, free to turn: that of a thin bearing which the cam bends, or of the bearing that is itself the eccentric. Teeth on a plain cam slide with nearly the cam’s own speed; a race nearly stands still with them, and the bearing’s small friction takes the place of theirs.',
+      text: 'A ring around the cam that is free to turn: the ring of a thin bearing that the cam bends, or of a bearing on an eccentric. Teeth on a plain cam slide with nearly the speed of the cam. A race nearly stands still with the teeth, so that only the small friction of the bearing remains.',
     },
     wear: {
       title: 'Wear rate',
@@ -294,7 +294,7 @@ const PAGE = {
     },
     pressure_velocity: {
       title: 'Pressure times velocity p·v',
-      text: 'The largest contact pressure of a tooth times the speed at which it slips there. Limits in handbooks are for the load over the projected area, which is far less: they must not be compared with it.',
+      text: 'The largest contact pressure of a tooth times the speed at which it slips there. Limits in handbooks are for the load over the projected area, which is far smaller. Do not compare them with this value.',
     },
     paper: {
       title: 'The paper',
