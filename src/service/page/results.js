@@ -26,6 +26,7 @@ const greatest = (column) => column?.reduce((most, value) => Math.max(most, valu
 
 const percent = (share) => `${share > 0 ? '+' : share < 0 ? '−' : ''}${Math.abs(Math.round(100 * share))}`;
 const span = ({ low, high }) => t('result.span', { low: percent(low), high: percent(high) });
+
 /** How far to believe some numbers: what the model was found to err by in drives of this case, calculated as elastic bodies. What is not like
  *  those drives is said once, at the peaks. */
 function believed(what, { sweep }, saysWhatIsUnlike) {
