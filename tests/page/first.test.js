@@ -98,8 +98,8 @@ test('numbers are accepted as people type them', async () => {
 test('every field has explanation, every number a symbol', async () => {
   const page = await bed.open();
   const fields = await page.evaluate(async () => {
-    const { GROUPS, fieldsOf } = await import('/page/design.js');
-    const { explanationOf } = await import('/page/texts.en.js');
+    const { GROUPS } = await import('/page/fields.js');
+    const { explanationOf, fieldsOf } = await import('/page/field.js');
     return GROUPS.flatMap(fieldsOf).map(({ pointer, kind, symbol }) => ({ pointer, kind, symbol, text: explanationOf(pointer) }));
   });
   assert.ok(fields.length >= 90);

@@ -236,7 +236,7 @@ test('peaks state their model error', async () => {
   const page = await bed.open();
   const told = () => page.$$eval('#table .told', (lines) => lines.map((line) => line.textContent));
   // The paper's model, whose forces are too large, without wind-up.
-  const estimated = 'From the parts as they are made; forces leave it out until it is taken over.';
+  const estimated = 'Estimated from the parts as they are made. Forces leave it out until you take it over.';
   assert.deepEqual(await told(), ['The model’s own error: force +1 to +8 %, stress −1 to +5 %; not measured with other sizes and loads under its law.', '', estimated]);
   const { model, ...unnamed } = await designOf(page);
   assert.ok(model);
@@ -391,7 +391,7 @@ test('fields match the API document, with listed exceptions', async () => {
   const { schemas } = (await (await fetch(`${bed.server.origin}/openapi.json`)).json()).components;
   const known = new Set([...valuesOf(schemas, schemas.Design)].map(({ pointer }) => pointer));
   const shown = await page.evaluate(async () => {
-    const { GROUPS, fieldsOf } = await import('/page/design.js');
+    const [{ GROUPS }, { fieldsOf }] = await Promise.all([import('/page/fields.js'), import('/page/field.js')]);
     return GROUPS.flatMap(fieldsOf).map(({ pointer, tag, kind, starts }) => ({ pointer: tag ? `${pointer}/${tag}` : pointer, isValue: kind !== 'oneOf' && starts === undefined && !pointer.startsWith('/ratio') }));
   });
   const fields = new Set(shown.filter(({ isValue }) => isValue).map(({ pointer }) => pointer));
@@ -404,7 +404,7 @@ test('every kind can be chosen and has its fields', async () => {
   const page = await bed.open();
   const { schemas } = (await (await fetch(`${bed.server.origin}/openapi.json`)).json()).components;
   const variants = await page.evaluate(async () => {
-    const { GROUPS, fieldsOf } = await import('/page/design.js');
+    const [{ GROUPS }, { fieldsOf }] = await Promise.all([import('/page/fields.js'), import('/page/field.js')]);
     const options = ({ options, pointer }) => Object.fromEntries(options.filter(({ value }) => value !== 'none').map(({ value, fields }) => [value, fields.map((field) => field.pointer).filter((inner) => inner.startsWith(`${pointer}/`))]));
     return Object.fromEntries(GROUPS.flatMap(fieldsOf).filter(({ kind }) => kind === 'variant').map((field) => [field.pointer, options(field)]));
   });
@@ -480,7 +480,7 @@ test('nominal picture says so and links to drawings', async () => {
   const { drive, load } = await designOf(page);
   const made = { drive, load, modification: { ring_equidistant_um: 10 } };
   await setDocument(page, made);
-  assert.equal(await told.textContent(), 'The picture is the nominal drive. The modification, of micrometres, is in the drawings, true to size.');
+  assert.equal(await told.textContent(), 'The picture is the nominal drive. The drawings show the modification, of micrometres, true to size.');
   // The picture's outline is that of the unmodified ring, unlike the drawing's.
   const ring = async (design) => (await bed.server.ask('/v1/drawings/ring', design)).bodies[0].holes[0];
   const outline = await page.getAttribute('#whole .part-ring', 'd');
@@ -489,7 +489,7 @@ test('nominal picture says so and links to drawings', async () => {
   assert.equal(await page.getAttribute('#whole .part-ring', 'd'), outline);
   assert.ok(await told.isHidden());
   await setDocument(page, { ...made, parts: { ring: { clearance_um: 10 } }, deviations: { ring_runout: { amount_um: 2 } } });
-  assert.equal(await told.textContent(), 'The picture is the nominal drive. The modification and clearances, of micrometres, are in the drawings, true to size. The deviations are in the numbers alone.');
+  assert.equal(await told.textContent(), 'The picture is the nominal drive. The drawings show the modification and clearances, of micrometres, true to size. The deviations affect only the numbers.');
   await told.locator('button').click();
   assert.ok(await page.isVisible('#downloads'));
 });

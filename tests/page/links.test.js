@@ -22,7 +22,7 @@ test('truncated link reports it and keeps its address', async () => {
   for (const cut of [whole.slice(0, -40), '#design=', '#desig']) {
     await page.context().close();
     page = await bed.open({ address: cut, hasClock: true });
-    assert.match(await page.textContent('#notice'), /damaged or was cut short.*ready design is shown instead/);
+    assert.match(await page.textContent('#notice'), /damaged or was cut short.*An example is shown instead/);
     const { drive, load } = await bed.server.example('paper-5.1');
     assert.deepEqual(await designOf(page), { drive, load });
     // Waits longer than the page delays its address after a change.
@@ -44,7 +44,7 @@ test('link with truncated reference shows its design', async () => {
   await page.context().close();
   page = await bed.open({ address: cut });
   assert.equal((await designOf(page)).drive.teeth.radius_mm, 4.5);
-  assert.match(await page.textContent('#notice'), /but the reference cannot be read/);
+  assert.match(await page.textContent('#notice'), /but its reference cannot be read/);
   assert.ok(await page.isHidden('#comparing'));
 });
 
@@ -101,7 +101,7 @@ test('file without design is shown with the reason', async () => {
   const page = await bed.open();
   await page.setInputFiles('#document-file', { name: 'broken.json', mimeType: 'application/json', buffer: Buffer.from('{ "drive": ') });
   await page.waitForSelector('#document-error:not([hidden])');
-  assert.match(await page.textContent('#document-error'), /no JSON/);
+  assert.match(await page.textContent('#document-error'), /not JSON/);
   assert.equal(await page.inputValue('#document-text'), '{ "drive": ');
 });
 

@@ -25,8 +25,8 @@ test('losses of three bearings are compared and applied', async () => {
   assert.deepEqual(rows.map(({ kind }) => kind), ['plain', 'race', 'rolling']);
   const [plain, race, rolling] = rows.map(({ efficiency }) => efficiency);
   assert.ok(plain < 0.55 && race > 0.85 && rolling > race, JSON.stringify(rows));
-  assert.match(rows[0].text, /locks itself/);
-  assert.match(await page.textContent('#losses-table caption'), /taken for the comparison.*0\.05.*0\.002/);
+  assert.match(rows[0].text, /self-locking/);
+  assert.match(await page.textContent('#losses-table caption'), /usual coefficients.*0\.05.*0\.002/);
   // The design does not change until a row is chosen.
   assert.equal((await designOf(page)).friction, undefined);
   assert.ok(await page.isHidden('#key-figures .tile:has-text("Efficiency")'));
@@ -34,7 +34,7 @@ test('losses of three bearings are compared and applied', async () => {
   await settled(page);
   assert.equal((await designOf(page)).friction.wave_generator.kind, 'race');
   near(await resultOf(page, 'Efficiency, ring fixed'), 100 * race, 'the row is the design');
-  assert.match(await page.textContent('#key-figures .tile:has-text("Efficiency")'), /ring fixed; .* from behind/);
+  assert.match(await page.textContent('#key-figures .tile:has-text("Efficiency")'), /ring fixed; .* back-driven/);
   assert.equal(await page.getAttribute('#losses-table tr[data-kind="race"] button', 'aria-pressed'), 'true');
   await page.click('#compare-losses');
   await page.waitForFunction(() => document.querySelector('#losses-state').textContent === '');
@@ -86,8 +86,8 @@ test('results, plot, table and colours match the service', async () => {
   await setDocument(page, design);
   const { losses, states } = (await bed.server.answers(design)).sweep;
   near(await resultOf(page, 'Efficiency, ring fixed'), 100 * losses.efficiency.ring_fixed, 'efficiency');
-  near(await resultOf(page, 'Power lost'), losses.power_loss_w, 'power');
-  near(await resultOf(page, 'Of it at the cam or race'), (100 * losses.loss_ratio_by_place.wave_generator) / losses.loss_ratio, 'share');
+  near(await resultOf(page, 'Power loss'), losses.power_loss_w, 'power');
+  near(await resultOf(page, 'Share lost at the cam or race'), (100 * losses.loss_ratio_by_place.wave_generator) / losses.loss_ratio, 'share');
   near(await resultOf(page, 'Pressure times velocity, carrier'), losses.pressure_velocity_mpa_m_per_s.carrier.value, 'p·v');
   near(await resultOf(page, 'Wear, wave generator'), 1000 * losses.wear_mm_per_hour.wave_generator.value, 'wear');
   assert.ok(await page.isVisible('#charts figure:has-text("Pressure times velocity")'));
@@ -113,7 +113,7 @@ test('results, plot, table and colours match the service', async () => {
   await enter(page, '/load/input_speed_rpm', '');
   assert.ok(await page.isHidden('#charts figure:has-text("Pressure times velocity")'));
   assert.match(await page.textContent('#legend'), /highest contact stress/);
-  assert.equal(await resultOf(page, 'Power lost'), undefined);
+  assert.equal(await resultOf(page, 'Power loss'), undefined);
 });
 
 test('each line of a duty is one load', async () => {
@@ -133,7 +133,7 @@ test('each line of a duty is one load', async () => {
   const alone = (await bed.server.answers({ ...(await designOf(page)), load: { input_torque_nm: 40 } })).sweep;
   assert.equal(await resultOf(page, 'Force, ring'), alone.peaks.ring.force_n.value, 'the peaks are those of the hardest');
   await page.fill(field('/load/duty'), '10 1500');
-  assert.match(await page.textContent(notes('/load/duty')), /Line 1 wants 3 numbers/);
+  assert.match(await page.textContent(notes('/load/duty')), /Line 1 needs 3 numbers/);
   await page.fill(field('/load/duty'), '10 1500 60');
   await settled(page);
   assert.match(await page.textContent(notes('/load/duty')), /add up to 0\.6/);

@@ -46,9 +46,9 @@ test('page survives any number, small or large', async () => {
 test('empty field says what it needs', async () => {
   const page = await bed.open();
   for (const [pointer, wanted] of [
-    [RADIUS, /Wanted here: the tooth radius, a number in mm, such as 5/],
-    ['/drive/teeth/count', /Wanted here: the slots in theory, a whole number, such as 28/],
-    ['/load/input_torque_nm', /Wanted here: the input torque, a number in N·m/],
+    [RADIUS, /Required: tooth radius, a number in mm, such as 5/],
+    ['/drive/teeth/count', /Required: slots in theory, a whole number, such as 28/],
+    ['/load/input_torque_nm', /Required: input torque, a number in N·m/],
   ]) {
     await enter(page, pointer, '');
     assert.match(await page.textContent(notes(pointer)), wanted);

@@ -37,9 +37,9 @@ function expected({ geometry, coincidence, sweep }) {
     'Ratio, ring fixed': geometry.transmission_ratio,
     'Ratio, carrier fixed': geometry.transmission_ratio_carrier_fixed,
     'Ratio of ring to carrier, wave generator fixed': geometry.members.wave_generator_fixed.ratio,
-    'Ring fixed, its torque over the input’s': geometry.members.ring_fixed.holding_torque_ratio,
-    'Carrier fixed, its torque over the input’s': geometry.members.carrier_fixed.holding_torque_ratio,
-    'Wave generator fixed, its over the ring’s': geometry.members.wave_generator_fixed.holding_torque_ratio,
+    'Ring torque over input torque, ring fixed': geometry.members.ring_fixed.holding_torque_ratio,
+    'Carrier torque over input torque, carrier fixed': geometry.members.carrier_fixed.holding_torque_ratio,
+    'Wave generator torque over ring torque': geometry.members.wave_generator_fixed.holding_torque_ratio,
     'Period of the load pattern': geometry.period_deg,
     'Contact ratio': coincidence.coincidence_degree,
     'Fewest teeth in mesh': coincidence.teeth_in_mesh_per_zone.min,
@@ -263,7 +263,7 @@ test('document is saved and loaded as file', async () => {
   await pick(page, '#open-document');
   await page.fill('#document-text', '{ "drive": ');
   await page.click('#document-apply');
-  assert.match(await page.textContent('#document-error'), /no JSON/);
+  assert.match(await page.textContent('#document-error'), /not JSON/);
   // A document with an unknown field is shown with the reason and a way out.
   await page.fill('#document-text', JSON.stringify({ ...design, colour: 'blue' }));
   await page.click('#document-apply');
@@ -312,7 +312,7 @@ const range = (values) => [Math.min(...values), Math.max(...values)];
 test('form asks for further options, table answers them', async () => {
   page = await open(browser, server);
   assert.equal(await resultOf(page, 'Least wind-up'), undefined);
-  assert.equal(await resultOf(page, 'Most teeth that carry'), undefined);
+  assert.equal(await resultOf(page, 'Most loaded teeth'), undefined);
   await page.selectOption(field('/model/stiffness'), 'palmgren');
   await page.selectOption(field('/model/compatibility'), 'virtual_work');
   await enter(page, '/parts/ring/clearance_um', 4);
@@ -345,12 +345,12 @@ test('form asks for further options, table answers them', async () => {
   assert.deepEqual([fewest, most], range(windUp.loaded_teeth));
   for (const [label, value] of Object.entries({
     'Least wind-up': leastWindUp,
-    'Most wind-up': mostWindUp,
+    'Largest wind-up': mostWindUp,
     'Least torsional stiffness': softest,
-    'Most torsional stiffness': stiffest,
+    'Largest torsional stiffness': stiffest,
     'Transmission error': windUp.transmission_error_peak_to_peak_deg,
-    'Fewest teeth that carry': fewest,
-    'Most teeth that carry': most,
+    'Fewest loaded teeth': fewest,
+    'Most loaded teeth': most,
     'Input torque': capacity.input_torque_nm,
     'Output torque': capacity.output_torque_nm,
     'At the input angle': capacity.input_angle_deg,
@@ -362,7 +362,7 @@ test('form asks for further options, table answers them', async () => {
   // Each value has its reference and its difference.
   await page.click('#keep');
   await enter(page, '/parts/ring/clearance_um', 8);
-  assert.match(await page.locator('#table tr', { hasText: 'Most wind-up' }).textContent(), /deg.*deg\+.*%/);
+  assert.match(await page.locator('#table tr', { hasText: 'Largest wind-up' }).textContent(), /deg.*deg\+.*%/);
   assert.match(await page.locator('#table tr', { hasText: 'Output torque' }).textContent(), /N·m.*N·m[−+].*%/);
   // A value of only one design is a dash for the other one, without a unit.
   await enter(page, '/load/allowable_stress_mpa', '');
@@ -1181,7 +1181,8 @@ test('long report has two readable pages with every finding', async () => {
     for (const { code } of findings) codes.add(code);
     assert.equal(await pagesOfReport(), 2, `${findings.length} findings`);
     const { table, parts, clearances, wanted, tooSmall, tooWide } = await onPaper(async (found) => {
-      const { kindOf, readable, sentence } = await import('/page/findings.js');
+      const { kindOf } = await import('/page/findings.js');
+      const { findingInWords, sentence } = await import('/page/words.js');
       const { number, withUnit } = await import('/page/format.js');
       const small = [];
       const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT, (node) =>
@@ -1199,7 +1200,7 @@ test('long report has two readable pages with every finding', async () => {
           kindOf(finding),
           withUnit(number(finding.value, 5), finding.unit),
           withUnit(number(finding.limit, 5), finding.unit),
-          sentence(readable(finding.advice)),
+          sentence(findingInWords(finding).advice),
         ]),
         tooSmall: small,
         tooWide: [...document.querySelectorAll('table')].filter((candidate) => candidate.getBoundingClientRect().right > innerWidth).map(({ id }) => id),

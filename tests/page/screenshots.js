@@ -70,7 +70,7 @@ await take('explore', { viewport: { width: 1366, height: 1000 }, colorScheme: 'd
   const rows = page.locator('#explore .ask-row');
   await rows.nth(2).locator('select').selectOption('/drive/wave_generator/semi_major_mm');
   await rows.nth(0).locator('select').nth(1).selectOption('fine');
-  await page.click('#explore button:has-text("Look")');
+  await page.click('#explore button:has-text("Calculate")');
   await page.waitForFunction(() => document.querySelector('#explore .study-progress').hidden && document.querySelector('#explore .heat'), undefined, PATIENCE);
 });
 

@@ -47,7 +47,7 @@ test('page asks for a key, keeps it in memory', async () => {
     assert.ok(await page.isHidden('#away'));
     await page.fill('#login-key', 'tw_0000');
     await page.keyboard.press('Enter');
-    await page.waitForFunction(() => document.querySelector('#login-detail').textContent.includes('opens nothing'));
+    await page.waitForFunction(() => document.querySelector('#login-detail').textContent.includes('does not accept'));
     await page.waitForSelector('#login:not([hidden])');
     await page.fill('#login-key', key);
     await page.keyboard.press('Enter');

@@ -132,7 +132,7 @@ test('curve matches the sweep and applies to the design', async () => {
   assert.equal(numberIn(await readout.textContent()), 980.44, 'of the design at first');
   await page.locator('#explore .study-place input').first().fill('120');
   const shown = numberIn(await readout.textContent());
-  await page.click('#explore button:has-text("Take into the design")');
+  await page.click('#explore button:has-text("Use in the design")');
   await settled(page);
   const design = await designOf(page);
   assert.equal(design.drive.teeth.radius_mm, 6, '120 of 160 steps from 3 to 7');
@@ -153,7 +153,7 @@ test('curve has a gap with reason for impossible drives', async () => {
   assert.match(await page.textContent('#explore .study-reasons'), /Impossible here.*of 161, the first at tooth radius 7\.\d+.mm: Neighbouring teeth.*come as near as/);
   await page.locator('#explore .study-place input').first().fill('160');
   assert.match(await page.textContent('#explore .study-readout'), /Tooth radius 9.mm: impossible – neighbouring teeth/);
-  assert.ok(await page.isDisabled('#explore button:has-text("Take into the design")'));
+  assert.ok(await page.isDisabled('#explore button:has-text("Use in the design")'));
 });
 
 test('map point applies two numbers to the design', async () => {
@@ -164,7 +164,7 @@ test('map point applies two numbers to the design', async () => {
   assert.match(await page.textContent('#explore .study-reasons'), /semi-minor/i, 'axes that are no ellipse’s');
   await page.click('#explore button:has-text("Least")');
   const shown = numberIn(await page.textContent('#explore .study-readout strong'));
-  await page.click('#explore button:has-text("Take into the design")');
+  await page.click('#explore button:has-text("Use in the design")');
   await settled(page);
   const design = await designOf(page);
   assert.notEqual(design.drive.teeth.radius_mm, 5);
@@ -182,7 +182,7 @@ test('slots vary together with ring teeth', async () => {
   await done(page, 'explore', '.curve-dot');
   assert.equal(await page.locator('#explore .curve-dot').count(), 17, 'from 20 to 36, none impossible');
   await page.locator('#explore .study-place input').first().fill('0');
-  await page.click('#explore button:has-text("Take into the design")');
+  await page.click('#explore button:has-text("Use in the design")');
   await settled(page);
   const { teeth, ring } = (await designOf(page)).drive;
   assert.deepEqual([teeth.count, ring.teeth], [20, 18]);
@@ -209,11 +209,11 @@ test('map of a million variants is thinned in drawing', async () => {
   page.on('worker', () => (workers += 1));
   await over(page, 2, SEMI_MAJOR);
   await page.locator('#explore .ask-row').first().locator('select').nth(1).selectOption('finest');
-  await page.waitForFunction(() => document.querySelector('#explore .study-state').textContent.includes('press “Look”'));
+  await page.waitForFunction(() => document.querySelector('#explore .study-state').textContent.includes('press “Calculate”'));
   assert.match(await page.textContent('#explore .study-state'), /1\u202f000\u202f000 variants are many/);
   const before = workers;
-  await page.click('#explore button:has-text("Look")');
-  await page.waitForFunction(() => document.querySelector('#explore .heat-legend').textContent.includes('drawn at every third step'));
+  await page.click('#explore button:has-text("Calculate")');
+  await page.waitForFunction(() => document.querySelector('#explore .heat-legend').textContent.includes('one step in 3 is drawn'));
   assert.ok(workers > before);
   const size = await page.$eval('#explore .heat', async (image) => {
     const drawn = new Image();
@@ -306,7 +306,7 @@ test('reasons of failed drives are counted', async () => {
   const page = await bed.open();
   await find(page);
   const reasons = page.locator('#find [aria-labelledby="reasons-title"]');
-  assert.match(await reasons.textContent(), /Before the search \d.* variants were spread evenly over all that is free/);
+  assert.match(await reasons.textContent(), /Before the search \d.* variants were spread evenly over the free numbers/);
   const rows = await reasons.locator('tbody tr').allTextContents();
   assert.ok(rows.some((row) => /^Torque capacity, output at least 200.N·m/.test(row)), rows.join('\n'));
   assert.match(await reasons.locator('details').first().textContent(), /such as: /);
@@ -410,7 +410,7 @@ test('tolerances start from grades of each part', async () => {
   // ISO 286-1, up to 10 mm: IT6 is 9 µm and IT7 15 µm of a diameter or a width.
   assert.deepEqual(graded, ['Radius of each tooth IT6: 0 to 4.5\u202fµm, normal', 'Wall of each slot IT7: 0 to 7.5\u202fµm, normal', 'Depth of each ring space IT7: 0 to 7.5\u202fµm, normal']);
   const asked = page.waitForRequest('**/v1/studies');
-  await page.click('#tolerance button:has-text("Draw drives")');
+  await page.click('#tolerance button:has-text("Sample drives")');
   const question = (await asked).postDataJSON();
   assert.deepEqual(question.base.modification, { tooth_radius_um: 2.25, slot_wall_um: 3.75, ring_equidistant_um: 3.75 }, 'the middles of the zones');
   assert.deepEqual(question.deviations.slot_wall_um, { distribution: 'normal', limit: 3.75, sigma: 1.25 });
@@ -464,7 +464,7 @@ test('bad requirements are reported at their fields', async () => {
   let asked = 0;
   page.on('request', (request) => (asked += request.url().endsWith('/v1/studies') ? 1 : 0));
   await page.fill(field('/find/output_torque_nm'), '');
-  assert.match(await page.textContent(notes('/find/output_torque_nm')), /Wanted here: the output torque, a number in N·m, such as 200/);
+  assert.match(await page.textContent(notes('/find/output_torque_nm')), /Required: output torque, a number in N·m, such as 200/);
   await page.fill(field('/find/ratio_max'), '15');
   assert.match(await page.textContent(notes('/find/ratio_max')), /range is empty/);
   for (const goal of ['small', 'strong']) await page.uncheck(field(`/find/goals/${goal}`));
@@ -538,11 +538,11 @@ test('deviations say they need virtual work and gaps', async () => {
   const page = await bed.open();
   await show(page, 'tolerance');
   await onlyDeviates(page, 'Depth of each ring space');
-  await page.waitForFunction(() => /by virtual work alone/.test(document.querySelector('#tolerance .study-state').textContent));
+  await page.waitForFunction(() => /need virtual work/.test(document.querySelector('#tolerance .study-state').textContent));
   await page.selectOption(field('/model/compatibility'), 'virtual_work');
   await page.waitForFunction(() => /take a while/.test(document.querySelector('#tolerance .study-state').textContent));
-  await page.click('#tolerance button:has-text("Draw drives")');
-  await page.waitForFunction(() => /100 of 100 cannot be put together; clearances give their parts room/.test(document.querySelector('#tolerance .headline').textContent));
+  await page.click('#tolerance button:has-text("Sample drives")');
+  await page.waitForFunction(() => /100 of 100 cannot be put together: increase the clearances/.test(document.querySelector('#tolerance .headline').textContent));
 });
 
 test('changed design repeats its study', async () => {

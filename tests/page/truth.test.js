@@ -156,5 +156,5 @@ test('other shaft’s torque comes from the service', async () => {
   await page.selectOption(field('/load'), 'output_torque_nm');
   await settled(page);
   assert.equal(await page.inputValue(field('/load/output_torque_nm')), '');
-  assert.match(await page.textContent('#notes-load-output_torque_nm'), /Wanted here/);
+  assert.match(await page.textContent('#notes-load-output_torque_nm'), /Required:/);
 });

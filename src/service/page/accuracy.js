@@ -4,15 +4,15 @@ import { at, changed, compatibilityOf, isSame, lawOf } from './design.js';
 import { html, setAttributes, setProperties, setText } from './dom.js';
 import { fixed, number } from './format.js';
 import { ask } from './service.js';
+import { labelled, t } from './texts.js';
+import { titleOfCode } from './words.js';
 
-const COMPATIBILITIES = { projection: 'Projection', virtual_work: 'Virtual work' };
-const LAWS = { linear: 'linear', fixed: 'fixed', palmgren: 'Palmgren', johnson: 'Johnson', hertz: 'Hertz' };
 const WANTED = '/accuracy/requested_error';
 const WANTED_ERRORS = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10];
 const WANTED_PRESET = 1e-6;
 
-const modelName = ({ compatibility, law }) => `${COMPATIBILITIES[compatibility]}, ${LAWS[law]}`;
-const pointsName = ({ samples, tolerance }) => (samples === undefined ? `to ${number(tolerance, 1)}` : `${samples} samples`);
+const modelName = ({ compatibility, law }) => t('accuracy.model', { compatibility: t(`term.${compatibility}.title`), law: t(`accuracy.law.${law}`) });
+const pointsName = ({ samples, tolerance }) => (samples === undefined ? t('summary.tolerance', { tolerance: number(tolerance, 1) }) : t('summary.samples', { count: samples }));
 
 /** What of a design the measurement depends on. */
 const questionOf = ({ drive, materials, parts, load, model, modification, deviations, accuracy }) => ({ drive, materials, parts, load, model, modification, deviations, accuracy });
@@ -79,7 +79,7 @@ export class Accuracy {
     const running = new AbortController();
     this.#running = running;
     const design = this.#design;
-    this.#message = 'Measuring…';
+    this.#message = t('accuracy.measuring');
     this.#show();
     try {
       const { answer, problem } = await ask('v1/accuracy', design, { signal: running.signal });
@@ -87,7 +87,7 @@ export class Accuracy {
         this.#measured = { design, answer };
         this.#build();
       }
-      this.#message = problem ? `${problem.title}: ${problem.detail}` : '';
+      this.#message = problem ? labelled(problem.title, problem.detail) : '';
     } catch (error) {
       if (running.signal.aborted) return;
       this.#message = error.message;
@@ -107,25 +107,25 @@ export class Accuracy {
     this.#rows = [];
     const tables = [...models].map(([name, ways]) => {
       const isOwn = isSameModel(ways[0], own);
-      const note = isOwn ? 'this design’s own' : `peaks differ by ${fixed(100 * ways[0].model_difference, 2)} % from this design’s`;
+      const note = isOwn ? t('accuracy.own') : t('accuracy.differs', { percent: fixed(100 * ways[0].model_difference, 2) });
       const details = html('details', { open: this.#folded.get(name) ?? isOwn }, html('summary', {}, name, ' ', html('span', { class: 'summary-note' }, note)), this.#table(name, ways));
       details.addEventListener('toggle', () => this.#folded.set(name, details.open));
       return details;
     });
-    const unavailable = answer.unavailable.map((model) => html('p', { class: 'none' }, `${modelName(model)}: no answer for this design (${model.code.replaceAll('_', ' ')})`));
+    const unavailable = answer.unavailable.map((model) => html('p', { class: 'none' }, labelled(modelName(model), t('accuracy.unavailable', { reason: titleOfCode(model.code) }))));
     this.list.replaceChildren(...tables, ...unavailable);
   }
 
   #table(name, ways) {
     const { cheapest } = this.#measured.answer;
-    const head = ['Input angles', 'Error of the peaks', 'Time, µs', 'States'].map((text, index) => html('th', { scope: 'col', class: index > 0 && 'numeric' }, text));
+    const head = [t('accuracy.input_angles'), t('accuracy.error'), t('accuracy.time'), t('accuracy.states')].map((text, index) => html('th', { scope: 'col', class: index > 0 && 'numeric' }, text));
     const rows = ways.map((way) => {
-      const button = html('button', { type: 'button', 'aria-label': `${pointsName(way)}: use with ${name}` }, pointsName(way));
+      const button = html('button', { type: 'button', 'aria-label': t('accuracy.use', { points: pointsName(way), model: name }) }, pointsName(way));
       const isCheapest = cheapest && isSameWay(way, cheapest);
       const cells = [way.error, way.solve_us, way.states].map((value, index) =>
         html('td', { class: 'numeric' }, html('data', { class: 'number', value }, number(value, index === 2 ? 7 : 2))),
       );
-      const row = html('tr', { class: isCheapest && 'cheapest' }, html('th', { scope: 'row' }, button, isCheapest && ` fastest within ${number(this.#measured.answer.requested_error, 2)}`), cells);
+      const row = html('tr', { class: isCheapest && 'cheapest' }, html('th', { scope: 'row' }, button, isCheapest && ` ${t('accuracy.fastest', { error: number(this.#measured.answer.requested_error, 2) })}`), cells);
       row.addEventListener('click', () => this.onApply(applied(way, this.#design, this.#measured.design)));
       this.#rows.push({ way, button });
       return row;
@@ -137,17 +137,18 @@ export class Accuracy {
     const measured = this.#measured;
     const isStale = measured !== undefined && !isSame(questionOf(measured.design), questionOf(this.#design));
     this.panel.classList.toggle('outdated', isStale);
-    setText(this.button, measured ? 'Measure again' : 'Measure');
+    setText(this.button, measured ? t('accuracy.measure_again') : t('accuracy.measure'));
     const own = choiceOf(this.#design);
     for (const { way, button } of this.#rows) setAttributes(button, { 'aria-pressed': isSameWay(way, own) });
-    setText(this.state, this.#message || (isStale ? 'Measured for another design; measure again for this one.' : measured ? this.#summary() : ''));
+    setText(this.state, this.#message || (isStale ? t('accuracy.stale') : measured ? this.#summary() : ''));
   }
 
   #summary() {
     const { requested_error: wanted, cheapest } = this.#measured.answer;
-    if (!cheapest) return `No choice of input angles is within ${number(wanted, 2)} for this design’s own model.`;
+    const error = number(wanted, 2);
+    if (!cheapest) return t('accuracy.none', { error });
     const expected = cheapest.expected_model_error;
-    const model = expected === undefined ? 'The model’s own error was not measured in drives like this.' : `The model itself errs by up to ${Math.round(100 * expected)} % against elastic bodies: smaller errors than a tenth of that are digits beyond it.`;
-    return `Fastest within ${number(wanted, 2)} for this design’s own model: ${pointsName(cheapest)}, ${number(cheapest.solve_us, 2)} µs. ${model}`;
+    const model = expected === undefined ? t('accuracy.not_measured') : t('accuracy.expected', { percent: Math.round(100 * expected) });
+    return `${t('accuracy.found', { error, points: pointsName(cheapest), time: number(cheapest.solve_us, 2) })} ${model}`;
   }
 }

@@ -2,6 +2,7 @@
 
 import { drawableStudy } from './grids.js';
 import { drawable } from './states.js';
+import { t } from './texts.js';
 
 /** As large as an answer may be to be read at once: some milliseconds. */
 const MOST_BYTES = 1 << 20;
@@ -27,7 +28,7 @@ export async function answerOf(response, kind, signal) {
   const { promise, resolve, reject } = Promise.withResolvers();
   const stop = () => reject(signal.reason);
   worker.addEventListener('message', ({ data: { answer, fault } }) => (fault === undefined ? resolve(answer) : reject(new Error(fault))));
-  worker.addEventListener('error', () => reject(new Error('A large answer could not be read.')));
+  worker.addEventListener('error', () => reject(new Error(t('service.unreadable'))));
   signal?.addEventListener('abort', stop);
   worker.postMessage({ bytes, kind }, [bytes]);
   try {

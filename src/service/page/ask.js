@@ -1,8 +1,9 @@
 // What studies are asked with: choices and numbers in a row.
 
 import { html } from './dom.js';
-import { readable, sentence } from './findings.js';
 import { typed } from './format.js';
+import { t } from './texts.js';
+import { sentence } from './words.js';
 
 /** A choice: `groups` are `{ title, options: [{ value, label }] }`. What was chosen stays as long as it is there. */
 export class Choice {
@@ -72,9 +73,9 @@ export class NumberBox {
 /** Where a study stands: a bar, words and a button to cancel it. */
 export class Progress {
   constructor(onCancel) {
-    this.bar = html('progress', { max: 1, 'aria-label': 'Progress' });
+    this.bar = html('progress', { max: 1, 'aria-label': t('study.progress') });
     this.words = html('span', { class: 'number' });
-    this.cancel = html('button', { type: 'button', onclick: onCancel }, 'Cancel');
+    this.cancel = html('button', { type: 'button', onclick: onCancel }, t('study.cancel'));
     this.element = html('div', { class: 'study-progress', hidden: true }, this.bar, this.words, this.cancel);
   }
 
@@ -94,5 +95,5 @@ export class Progress {
 /** What keeps a study from being carried out, in words. */
 export function problemNote({ title, detail, errors = [] }) {
   const words = errors.length > 0 ? errors.map((error) => error.detail) : [detail];
-  return html('div', { class: 'note problem' }, html('strong', {}, `${title}.`), html('ul', {}, words.map((text) => html('li', {}, sentence(readable(text))))));
+  return html('div', { class: 'note problem' }, html('strong', {}, sentence(title)), html('ul', {}, words.map((text) => html('li', {}, sentence(text)))));
 }

@@ -35,6 +35,3 @@ export function converted(design) {
   const has = (key) => at(design, `/model/${key}`) !== undefined;
   return ['clearance', ...SWITCHES].some(has) ? withRefinements(withClearances(design)) : design;
 }
-
-/** What is told of a document that was converted. */
-export const CONVERTED = 'This design was made by an earlier version. Its gaps are now clearances of the parts, and its refinements one choice.';

@@ -13,6 +13,8 @@ function build(element, attributes, children) {
   return element;
 }
 
+export const byId = (id) => document.getElementById(id);
+
 export const html = (tag, attributes, ...children) => build(document.createElement(tag), attributes, children);
 export const svg = (tag, attributes, ...children) => build(document.createElementNS(SVG, tag), attributes, children);
 

@@ -6,6 +6,7 @@ import { html, setText } from './dom.js';
 import { reasonsOf } from './findings.js';
 import { ask } from './service.js';
 import { save } from './share.js';
+import { labelled, parts, t } from './texts.js';
 
 /** By the ending of the file: what is accepted, and what else is asked. */
 const FORMATS = {
@@ -21,17 +22,17 @@ const FORMATS = {
 const DRAWN = ['step', 'dxf', 'svg', '3mf', 'stl'];
 const TABLE = ['csv', 'comma.csv'];
 
-const drawing = (part, name) => ({ part, name, path: `v1/drawings/${part}`, formats: DRAWN });
+const drawing = (part) => ({ part, path: `v1/drawings/${part}`, formats: DRAWN });
 
 const FILES = [
-  drawing('assembly', 'Assembly'),
-  drawing('ring', 'Ring'),
-  drawing('wave-generator', 'Wave generator'),
-  drawing('carrier', 'Carrier'),
-  drawing('tooth', 'Tooth'),
-  { part: 'plots', name: 'Force and stress plots', path: 'v1/sweep', formats: ['svg'] },
-  { part: 'states', name: 'Forces and stresses', path: 'v1/sweep', formats: TABLE },
-  { part: 'profiles', name: 'Profiles as points', path: 'v1/geometry', formats: TABLE },
+  drawing('assembly'),
+  drawing('ring'),
+  drawing('wave-generator'),
+  drawing('carrier'),
+  drawing('tooth'),
+  { part: 'plots', path: 'v1/sweep', formats: ['svg'] },
+  { part: 'states', path: 'v1/sweep', formats: TABLE },
+  { part: 'profiles', path: 'v1/geometry', formats: TABLE },
 ];
 
 export class Drawings {
@@ -45,17 +46,17 @@ export class Drawings {
   constructor({ list, state }, callbacks) {
     Object.assign(this, callbacks);
     this.state = state;
-    for (const file of FILES) list.append(this.#build(file));
-    list.append(html('li', {}, html('span', {}, 'Report'), html('span', { class: 'cluster' }, html('button', { type: 'button', id: 'print', onclick: () => this.onReport() }, 'Print or PDF'))));
+    for (const file of FILES) list.append(this.#build({ ...file, name: t(`drawing.${file.part}`) }));
+    list.append(html('li', {}, html('span', {}, t('drawing.report')), html('span', { class: 'cluster' }, html('button', { type: 'button', id: 'print', onclick: () => this.onReport() }, t('drawing.print')))));
   }
 
   #build(file) {
     const { part, name, formats } = file;
     const buttons = formats.map((format) => {
       const { label } = FORMATS[format];
-      return html('button', { type: 'button', 'data-file': `${part}.${format}`, 'aria-label': `${label}: ${name}`, onclick: () => this.#fetch(file, format) }, label);
+      return html('button', { type: 'button', 'data-file': `${part}.${format}`, 'aria-label': labelled(label, name), onclick: () => this.#fetch(file, format) }, label);
     });
-    return html('li', {}, html('span', {}, name, part === 'assembly' && [' at ', this.#angle]), html('span', { class: 'cluster' }, buttons));
+    return html('li', {}, html('span', {}, part === 'assembly' ? parts('drawing.at_angle', { name, angle: this.#angle }) : name), html('span', { class: 'cluster' }, buttons));
   }
 
   /** A refusal stands as long as the design that it is about. */
@@ -80,15 +81,15 @@ export class Drawings {
     const { accept, query = '' } = FORMATS[format];
     const design = this.#design;
     const asked = part === 'assembly' ? changed(design, '/assembly/input_angle_deg', this.#inputDeg) : design;
-    const angle = part === 'assembly' ? `, input angle ${this.#angle.textContent}` : '';
-    const fileName = this.nameOf(`-${part}.${format}`);
-    this.state.replaceChildren(`Drawing ${name.toLowerCase()}…`);
+    const file = this.nameOf(`-${part}.${format}`);
+    const done = { file, angle: this.#angle.textContent };
+    this.state.replaceChildren(t('drawing.drawing', { name: name.toLowerCase() }));
     try {
       const { answer, problem } = await ask(`${path}${query}`, asked, { accept });
       if (problem) this.#refuse(name, problem, design);
       else {
-        save(answer, fileName);
-        this.#settle(design, undefined, `Downloaded ${fileName}${angle}.`);
+        save(answer, file);
+        this.#settle(design, undefined, part === 'assembly' ? t('drawing.done_at_angle', done) : t('drawing.done', done));
       }
     } catch (error) {
       this.#settle(design, undefined, error.message);
@@ -97,9 +98,9 @@ export class Drawings {
 
   #refuse(name, problem, design) {
     const reasons = reasonsOf([problem]).map(({ pointer, detail }) =>
-      html('li', {}, pointer ? html('button', { type: 'button', class: 'link', onclick: () => this.goTo(pointer) }, `${this.labelOf(pointer)}: ${detail}`) : detail),
+      html('li', {}, pointer ? html('button', { type: 'button', class: 'link', onclick: () => this.goTo(pointer) }, labelled(this.labelOf(pointer), detail)) : detail),
     );
-    this.#settle(design, problem, html('div', { class: 'note problem' }, html('strong', {}, `${name}: ${problem.title}. Nothing was downloaded.`), html('ul', {}, reasons)));
+    this.#settle(design, problem, html('div', { class: 'note problem' }, html('strong', {}, t('drawing.refused', { name, problem: problem.title })), html('ul', {}, reasons)));
   }
 
   /** The last word about a file; fields are marked only while the design is still the one that was asked about. */

@@ -4,11 +4,12 @@ import { Choice, NumberBox } from './ask.js';
 import { axes, spread } from './chart.js';
 import { at } from './design.js';
 import { html, oncePerFrame, setText, svg } from './dom.js';
-import { readable, sentence } from './findings.js';
 import { number, withUnit } from './format.js';
 import { thinned } from './grids.js';
 import { baseOf, parameterOf, parametersOf, rangeOf, withValues } from './parameters.js';
 import { StudyView } from './study-view.js';
+import { capital, labelled, listed, parts, t } from './texts.js';
+import { detailOf, sentence } from './words.js';
 
 const FIRST_QUANTITY = 'peak_stress_mpa';
 const FIRST_PARAMETER = '/drive/teeth/radius_mm';
@@ -18,10 +19,10 @@ const NONE = '';
 const MOST_AT_ONCE = 3000;
 
 const FINENESS = [
-  { value: 'coarse', label: 'coarse', curve: 41, map: 21 },
-  { value: 'medium', label: 'medium', curve: 161, map: 51 },
-  { value: 'fine', label: 'fine', curve: 1001, map: 161 },
-  { value: 'finest', label: 'finest', curve: 10001, map: 1000 },
+  { value: 'coarse', label: t('explore.coarse'), curve: 41, map: 21 },
+  { value: 'medium', label: t('explore.medium'), curve: 161, map: 51 },
+  { value: 'fine', label: t('explore.fine'), curve: 1001, map: 161 },
+  { value: 'finest', label: t('explore.finest'), curve: 10001, map: 1000 },
 ];
 
 const HEIGHT = 380;
@@ -31,8 +32,6 @@ const MOST_POINTS = 2400;
 
 /** From low to high, alike in light and dark: samples of viridis (van der Walt and Smith, 2015). */
 const HEAT = [[68, 1, 84], [72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137], [53, 183, 121], [109, 205, 89], [180, 222, 44], [253, 231, 37]];
-
-const ordinal = (count) => ({ 2: 'second', 3: 'third' })[count] ?? `${count}th`;
 
 const rgb = (color) => `rgb(${color.map(Math.round).join(' ')})`;
 
@@ -84,7 +83,7 @@ export class Explore extends StudyView {
 
   /** `onUse(design)` when values are taken into the design. */
   constructor(section, { quantities, onUse }) {
-    super({ mostAtOnce: MOST_AT_ONCE, verb: 'Look' });
+    super({ mostAtOnce: MOST_AT_ONCE, verb: t('explore.look') });
     this.section = section;
     this.quantities = quantities;
     this.onUse = onUse;
@@ -94,15 +93,15 @@ export class Explore extends StudyView {
 
   #build() {
     const changed = () => this.later();
-    this.quantity = new Choice('Quantity', changed);
-    this.axes = ['over', 'and over'].map((label, index) => {
+    this.quantity = new Choice(t('study.quantity'), changed);
+    this.axes = [t('explore.over'), t('explore.and_over')].map((label, index) => {
       const parameter = new Choice(label, () => this.#span(index));
-      const ends = ['from', 'to'].map((end) => new NumberBox(`${label}: ${end}`, changed));
+      const ends = [t('explore.from'), t('explore.to')].map((end) => new NumberBox(labelled(label, end), changed));
       const unit = html('span', { class: 'unit' });
-      const range = html('span', { class: 'range' }, 'from ', ends[0].input, ' to ', ends[1].input, ' ', unit);
+      const range = html('span', { class: 'range' }, parts('explore.range', { from: ends[0].input, to: ends[1].input }), ' ', unit);
       return { parameter, ends, unit, range, element: html('div', { class: 'ask-row' }, parameter.element, range) };
     });
-    this.fineness = new Choice('Steps', changed);
+    this.fineness = new Choice(t('explore.steps'), changed);
     this.fineness.offer([{ options: FINENESS }], 'medium');
     this.chart = html('div', { class: 'study-chart', role: 'img' });
     this.legend = html('p', { class: 'heat-legend', hidden: true });
@@ -116,13 +115,13 @@ export class Explore extends StudyView {
       const name = html('span', {});
       return { slider, name, element: html('label', { class: 'study-place' }, name, slider) };
     });
-    this.use = html('button', { type: 'button', onclick: () => this.#use() }, 'Take into the design');
+    this.use = html('button', { type: 'button', onclick: () => this.#use() }, t('explore.use'));
     this.extremes = html('span', { class: 'extremes' });
     this.reading = html('div', { class: 'study-reading', hidden: true }, this.readout, this.places.map(({ element }) => element), html('div', { class: 'actions' }, this.use, this.extremes));
     this.reasons = html('div', { class: 'study-reasons' });
     this.section.append(
-      html('header', {}, html('h2', { id: 'explore-title', tabindex: '-1' }, 'Explore')),
-      html('p', { class: 'none' }, 'How a quantity changes with one number of the design, or with two; the others stay as they are in the form.'),
+      html('header', {}, html('h2', { id: 'explore-title', tabindex: '-1' }, t('view.explore'))),
+      html('p', { class: 'none' }, t('explore.intro')),
       html('div', { class: 'ask' }, html('div', { class: 'ask-row' }, this.quantity.element, this.fineness.element, this.button), this.axes.map(({ element }) => element)),
       this.progress.element,
       this.state,
@@ -158,7 +157,7 @@ export class Explore extends StudyView {
     const parameters = [...groups].map(([title, options]) => ({ title, options }));
     this.axes.forEach(({ parameter }, index) => {
       const before = parameter.value;
-      parameter.offer(index === 0 ? parameters : [{ options: [{ value: NONE, label: 'nothing else' }] }, ...parameters], index === 0 ? FIRST_PARAMETER : NONE);
+      parameter.offer(index === 0 ? parameters : [{ options: [{ value: NONE, label: t('explore.nothing_else') }] }, ...parameters], index === 0 ? FIRST_PARAMETER : NONE);
       if (parameter.value !== before || this.axes[index].ends[0].input.value === '') this.#span(index, true);
     });
   }
@@ -181,7 +180,7 @@ export class Explore extends StudyView {
   ask() {
     const used = this.axes.filter(({ parameter }) => parameter.value !== NONE);
     const pointers = used.map(({ parameter }) => parameter.value);
-    if (pointers.length === 2 && pointers[0] === pointers[1]) return { fault: 'Both axes are the same: choose two different numbers, or one alone.' };
+    if (pointers.length === 2 && pointers[0] === pointers[1]) return { fault: t('explore.same_axes') };
     const fineness = FINENESS.find(({ value }) => value === this.fineness.value);
     const steps = used.length === 1 ? fineness.curve : fineness.map;
     const over = {};
@@ -190,8 +189,8 @@ export class Explore extends StudyView {
       const fault = ends.map((end) => end.fault).find((text) => text !== undefined);
       const [min, max] = ends.map(({ value }) => value);
       if (fault !== undefined) return { fault };
-      if (min === undefined || max === undefined) return { fault: 'A range has two ends: say from where to where.' };
-      if (min >= max) return { fault: `The range of “${parameter.label}” is empty: it goes from ${number(min)} to ${number(max)}.` };
+      if (min === undefined || max === undefined) return { fault: t('explore.open_range') };
+      if (min >= max) return { fault: t('explore.empty_range', { label: parameter.label, min: number(min), max: number(max) }) };
       const { isWhole } = parameterOf(this.design, parameter.value) ?? {};
       over[parameter.value] = { min, max, ...(isWhole ? {} : { steps }) };
       variants *= isWhole ? Math.floor(max) - Math.ceil(min) + 1 : steps;
@@ -229,7 +228,7 @@ export class Explore extends StudyView {
   }
 
   #placeInWords(cursor) {
-    return this.#result.lines.map(({ label, unit, values }, index) => `${label.toLowerCase()} ${withUnit(number(values[cursor[index]], 5), unit)}`).join(', ');
+    return listed(this.#result.lines.map(({ label, unit, values }, index) => `${label.toLowerCase()} ${withUnit(number(values[cursor[index]], 5), unit)}`));
   }
 
   #showExtremes() {
@@ -244,9 +243,9 @@ export class Explore extends StudyView {
             this.#point();
           },
         },
-        `${word}: ${this.quantities.shown(name, values[variant])}`,
+        labelled(word, this.quantities.shown(name, values[variant])),
       );
-    this.extremes.replaceChildren(...(least < 0 ? [] : [button(least, 'Least'), button(most, 'Largest')]));
+    this.extremes.replaceChildren(...(least < 0 ? [] : [button(least, t('explore.least')), button(most, t('explore.largest'))]));
   }
 
   #showReasons() {
@@ -256,10 +255,10 @@ export class Explore extends StudyView {
       this.reasons.replaceChildren();
       return;
     }
-    const items = answer.reasons.map(({ variants, detail, first_variant: first }, index) =>
-      html('li', {}, html('span', { class: 'swatch hatched', 'aria-hidden': 'true' }, this.#result.lines.length === 1 ? String(index + 1) : ''), html('span', {}, `${number(variants, 9)} of ${number(answer.variants, 9)}, the first at ${this.#placeInWords(this.#placesOf(first))}: ${sentence(readable(detail))}`)),
+    const items = answer.reasons.map(({ variants, first_variant: first, ...reason }, index) =>
+      html('li', {}, html('span', { class: 'swatch hatched', 'aria-hidden': 'true' }, this.#result.lines.length === 1 ? String(index + 1) : ''), html('span', {}, t('explore.reason', { count: number(variants, 9), all: number(answer.variants, 9), place: this.#placeInWords(this.#placesOf(first)), reason: sentence(detailOf(reason)) }))),
     );
-    this.reasons.replaceChildren(html('h3', {}, 'Impossible here'), html('ul', {}, items));
+    this.reasons.replaceChildren(html('h3', {}, t('explore.impossible_here')), html('ul', {}, items));
   }
 
   #use() {
@@ -278,7 +277,7 @@ export class Explore extends StudyView {
     this.cursorMark = svg('path', { class: 'cursor-mark' });
     this.cursorDot = svg('circle', { class: 'cursor-dot', r: 5 });
     this.frame.plot.append(this.cursorMark, this.cursorDot);
-    this.chart.setAttribute('aria-label', `${this.quantities.headed(result.name)} over ${result.lines.map(({ label }) => label.toLowerCase()).join(' and ')}; the sliders below read it off`);
+    this.chart.setAttribute('aria-label', t('explore.chart', { quantity: this.quantities.headed(result.name), axes: result.lines.map(({ label }) => label.toLowerCase()).join(t('list.and')) }));
     this.#point();
   }
 
@@ -321,7 +320,7 @@ export class Explore extends StudyView {
     if (places.length <= 60) kept.filter((index) => !Number.isNaN(values[index])).forEach((index) => frame.plot.append(svg('circle', { class: 'curve-dot', cx: frame.x(places[index]), cy: frame.y(values[index]), r: 2.6 })));
     if (line.value >= places[0] && line.value <= places.at(-1)) {
       const x = frame.x(line.value);
-      frame.plot.append(svg('path', { class: 'now', d: `M${x} ${frame.box.top}V${frame.box.bottom}` }), svg('text', { class: 'now-label', x: x + 5, y: frame.box.bottom - 7 }, 'design'));
+      frame.plot.append(svg('path', { class: 'now', d: `M${x} ${frame.box.top}V${frame.box.bottom}` }), svg('text', { class: 'now-label', x: x + 5, y: frame.box.bottom - 7 }, t('explore.design')));
     }
   }
 
@@ -360,15 +359,15 @@ export class Explore extends StudyView {
     ramp.style.background = `linear-gradient(to right, ${HEAT.map(rgb).join(', ')})`;
     this.legend.hidden = false;
     this.legend.replaceChildren(
-      html('span', {}, `${this.quantities.headed(name)}: `),
+      html('span', {}, labelled(this.quantities.headed(name), '')),
       html('span', { class: 'number' }, number(low, 4)),
       ramp,
       html('span', { class: 'number' }, `${high < values[most] ? '≥ ' : ''}${number(high, 4)}`),
-      ...(isLogarithmic ? [html('span', {}, '(by the logarithm)')] : []),
+      ...(isLogarithmic ? [html('span', {}, t('explore.logarithm'))] : []),
       html('span', { class: 'swatch hatched', 'aria-hidden': 'true' }),
-      html('span', {}, 'impossible'),
-      ...(isWithin ? [html('span', {}, '+ the design')] : []),
-      ...(Math.max(...strides) > 1 ? [html('span', {}, `drawn at every ${ordinal(Math.max(...strides))} step`)] : []),
+      html('span', {}, t('explore.impossible')),
+      ...(isWithin ? [html('span', {}, t('explore.the_design'))] : []),
+      ...(Math.max(...strides) > 1 ? [html('span', {}, t('explore.strides', { count: Math.max(...strides) }))] : []),
     );
   }
 
@@ -378,13 +377,13 @@ export class Explore extends StudyView {
     const variant = this.#variantAt(this.#cursor);
     const value = values[variant];
     const reason = answer.reasons[answer.reason[variant] - 1];
-    const here = Number.isNaN(value) ? (reason ? `impossible – ${readable(reason.detail)}` : 'not looked at') : this.quantities.shown(name, value, 5);
+    const here = Number.isNaN(value) ? (reason ? t('explore.impossible_as', { reason: detailOf(reason) }) : t('explore.not_looked_at')) : this.quantities.shown(name, value, 5);
     const place = this.#placeInWords(this.#cursor);
-    this.readout.replaceChildren(`${place[0].toUpperCase()}${place.slice(1)}: `, html('strong', {}, here));
+    this.readout.replaceChildren(labelled(capital(place), ''), html('strong', {}, here));
     this.use.disabled = Number.isNaN(value) || lines.every(({ pointer, values: line }, index) => at(this.design, pointer) === line[this.#cursor[index]]);
     this.places.slice(0, lines.length).forEach(({ slider }, index) => {
       if (Number(slider.value) !== this.#cursor[index]) slider.value = this.#cursor[index];
-      slider.setAttribute('aria-valuetext', `${withUnit(number(lines[index].values[this.#cursor[index]], 5), lines[index].unit)}: ${here}`);
+      slider.setAttribute('aria-valuetext', labelled(withUnit(number(lines[index].values[this.#cursor[index]], 5), lines[index].unit), here));
     });
     const { frame } = this;
     if (!frame) return;

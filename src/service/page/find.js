@@ -4,14 +4,15 @@ import { Progress } from './ask.js';
 import { axes } from './chart.js';
 import { at, changed, isSame } from './design.js';
 import { html, svg } from './dom.js';
-import { readable, sentence } from './findings.js';
 import { Form } from './form.js';
 import { number } from './format.js';
 import { Front } from './front.js';
-import { apart, bestOf, counted, held, limitInWords, roomFor, small, together } from './reasons.js';
+import { apart, bestOf, held, limitInWords, roomFor, shareOf, together } from './reasons.js';
 import { FIRST, GROUPS, ROOT, faultsOf, fieldOf, goalsOf, searchesOf } from './requirements.js';
 import { bestRounded, roundingOf } from './rounding.js';
 import { Run } from './studies.js';
+import { capital, counted, labelled, small, t } from './texts.js';
+import { detailOf, sentence } from './words.js';
 
 /** Narrower than this the results stand below the form. */
 const NARROW = '(max-width: 900px)';
@@ -29,8 +30,8 @@ export class Find {
   /** `onOpen(design, title)` when a drive is taken as design, `onOpenBoth` with another one as reference. */
   constructor(section, { quantities, onOpen, onOpenBoth }) {
     this.quantities = quantities;
-    this.button = html('button', { type: 'submit', class: 'primary' }, 'Find drives');
-    const formElement = html('form', { class: 'form', 'aria-label': 'Requirements', autocomplete: 'off', novalidate: true }, html('h2', {}, 'Requirements'));
+    this.button = html('button', { type: 'submit', class: 'primary' }, t('find.find'));
+    const formElement = html('form', { class: 'form', 'aria-label': t('find.requirements'), autocomplete: 'off', novalidate: true }, html('h2', {}, t('find.requirements')));
     this.form = new Form(formElement, { onEdit: (requirements) => this.#edit(requirements), onEnd: () => this.#check() }, GROUPS, ROOT);
     formElement.append(html('div', { class: 'form-end' }, this.button));
     formElement.addEventListener('submit', (event) => {
@@ -45,8 +46,8 @@ export class Find {
     this.results = html(
       'section',
       { class: 'panel', 'aria-labelledby': 'find-title' },
-      html('header', {}, html('h2', { id: 'find-title', tabindex: '-1' }, 'Find a drive')),
-      html('p', { class: 'none' }, 'Enter ratio, torque and available space. The search evaluates thousands of drives and shows the best trade-offs.'),
+      html('header', {}, html('h2', { id: 'find-title', tabindex: '-1' }, t('view.find'))),
+      html('p', { class: 'none' }, t('find.intro')),
       this.progress.element,
       this.state,
     );
@@ -54,7 +55,7 @@ export class Find {
     const column = html('div', { role: 'main', class: 'find-results' }, this.results);
     this.front = new Front(column, {
       quantities,
-      onOpen: ({ design, name, label }) => onOpen(design, `${name}, ${label}`),
+      onOpen: ({ design, name, label }) => onOpen(design, t('find.drive_title', { name, label })),
       onOpenBoth: (found, reference) => onOpenBoth({ design: found.design, title: found.name }, { design: reference.design, title: reference.name }),
     });
     this.preview = previewOf();
@@ -84,7 +85,7 @@ export class Find {
     this.#run?.giveUp();
     this.#isCancelled = false;
     if (!this.#check()) {
-      this.state.replaceChildren('Something is missing or cannot be: see the marked fields.');
+      this.state.replaceChildren(t('find.incomplete'));
       return;
     }
     this.#asked = this.#requirements;
@@ -98,23 +99,23 @@ export class Find {
       for (const [index, { label, question, fault }] of searches.entries()) {
         if (this.#isCancelled) break;
         if (fault) {
-          notes.push(`${capital(label)}: ${fault}.`);
+          notes.push(labelled(capital(label), sentence(fault)));
           continue;
         }
         const share = (part) => (index + part) / searches.length;
         this.progress.show(`${capital(label)}…`, share(0));
         const { answer, problem } = await this.#follow(question, ({ variants, lookedAt, full }) => {
-          this.progress.show(full ?? `${capital(label)}: ${number(lookedAt, 9)} of ${number(variants, 9)} variants`, full ? undefined : share(lookedAt / variants));
+          this.progress.show(full ?? labelled(capital(label), t('study.looked_at', { count: number(lookedAt, 9), all: number(variants, 9) })), full ? undefined : share(lookedAt / variants));
         });
         if (attempt !== this.#attempt) return;
-        if (problem) notes.push(`${capital(label)}: ${problem.title}. ${problem.detail}`);
+        if (problem) notes.push(labelled(capital(label), `${sentence(problem.title)} ${sentence(problem.detail)}`));
         if (answer) answers.push({ label, question, answer });
       }
       const found = together(answers);
       const best = bestOf(found.drives, goals);
       const shown = at(this.#asked, `${ROOT}/rounded`) ? await this.#rounded(best, goals) : best;
       if (attempt !== this.#attempt) return;
-      if (best.length > 0 && shown.length === 0) notes.push('No drive keeps every limit when its lengths are rounded to 0.01 mm. Relax a limit a little, or show exact lengths.');
+      if (best.length > 0 && shown.length === 0) notes.push(t('find.none_rounded'));
       this.#finish({ ...found, ...held(shown, found.limits), goals, notes, isCancelled: this.#isCancelled });
     } catch (error) {
       if (attempt === this.#attempt && !this.#isCancelled) throw error;
@@ -133,7 +134,7 @@ export class Find {
     const rounded = [];
     for (const [index, found] of drives.entries()) {
       if (this.#isCancelled) break;
-      this.progress.show(`Rounding to 0.01 mm: drive ${index + 1} of ${drives.length}`, index / drives.length);
+      this.progress.show(t('find.rounding', { index: index + 1, count: drives.length }), index / drives.length);
       const question = roundingOf(found);
       const { answer } = question ? await this.#follow(question) : {};
       const drive = question ? answer && bestRounded(found, answer, goals) : found;
@@ -176,10 +177,10 @@ export class Find {
 
   #show(found) {
     const { front, goals, notes, scan, without, isCancelled } = found;
-    const headline = front.length > 0 ? `${front.length === 1 ? 'One drive meets' : `${front.length} drives meet`} all limits${front.length > 1 ? ' (Pareto front): none is better than another in everything that counts' : ''}.` : scan.variants === 0 ? '' : 'No drive meets all limits.';
+    const headline = front.length > 0 ? counted('find.found', front.length) : scan.variants === 0 ? '' : t('find.none');
     const misses = front.length === 0 ? without : [];
     this.preview.hidden = true;
-    this.state.replaceChildren(html('p', { class: 'headline' }, isCancelled ? 'Cancelled. ' : '', headline), ...misses.map((miss) => this.#missNote(miss, misses.length > 1)), ...notes.map((text) => html('p', {}, text)));
+    this.state.replaceChildren(html('p', { class: 'headline' }, isCancelled ? `${t('find.cancelled')} ` : '', headline), ...misses.map((miss) => this.#missNote(miss, misses.length > 1)), ...notes.map((text) => html('p', {}, text)));
     this.front.show(front, goals);
     this.#showReasons(found);
   }
@@ -187,17 +188,17 @@ export class Find {
   /** What would have to give for a kind of drive to be possible. */
   #missNote({ label, miss, relaxations }, isNamed) {
     const name = isNamed ? [html('h3', {}, capital(label))] : [];
-    if (!miss) return html('div', {}, name, html('p', {}, 'None of the variants is a drive at all: the reasons are below.'));
+    if (!miss) return html('div', {}, name, html('p', {}, t('find.no_drive_at_all')));
     // What makes a drive buildable is not to be had for less.
     const items = relaxations.filter(({ quantity }) => fieldOf(quantity)).map((relaxation) => {
       const { quantity, limit, needed } = relaxation;
       const { label: what, is_flag: isFlag } = this.quantities.get(quantity);
-      const words = isFlag ? `Allow ${small(what)}` : `${what}: ${apart(this.quantities, quantity, needed, limit)} instead of ${this.quantities.shown(quantity, limit)}`;
+      const words = isFlag ? t('find.allow', { what: small(what) }) : t('find.instead', { what, value: apart(this.quantities, quantity, needed, limit), limit: this.quantities.shown(quantity, limit) });
       const room = isFlag ? true : roomFor(relaxation);
-      const allow = html('button', { type: 'button', onclick: () => this.#relax([[fieldOf(quantity), room]]) }, isFlag ? 'Allow it' : `Set ${apart(this.quantities, quantity, room, limit)}`);
-      return html('li', {}, `${words}. `, allow);
+      const allow = html('button', { type: 'button', onclick: () => this.#relax([[fieldOf(quantity), room]]) }, isFlag ? t('find.allow_it') : t('find.set', { value: apart(this.quantities, quantity, room, limit) }));
+      return html('li', {}, `${sentence(words)} `, allow);
     });
-    const missed = miss.missed.map((limit) => `${small(this.quantities.get(limit.quantity).label)} ${apart(this.quantities, limit.quantity, miss.quantities[limit.quantity], limit.limit)} (${limitInWords(limit, this.quantities, { isWithin: true })})`);
+    const missed = miss.missed.map((limit) => t('find.missed', { what: small(this.quantities.get(limit.quantity).label), value: apart(this.quantities, limit.quantity, miss.quantities[limit.quantity], limit.limit), limit: limitInWords(limit, this.quantities, { isWithin: true }) }));
     // Where no limit can give alone, those that the nearest miss breaks give together.
     const isTogether = items.length === 0 && miss.missed.every(({ quantity, bound }) => fieldOf(quantity) && bound !== 'is');
     const all = miss.missed.map((limit) => [fieldOf(limit.quantity), roomFor({ ...limit, needed: miss.quantities[limit.quantity] })]);
@@ -205,13 +206,13 @@ export class Find {
       'div',
       { class: 'miss' },
       name,
-      items.length > 0 && [html('p', {}, 'Relax one of these limits, all others kept:'), html('ul', {}, items)],
+      items.length > 0 && [html('p', {}, t('find.relax')), html('ul', {}, items)],
       html(
         'p',
         {},
-        `The nearest drive breaks: ${missed.join('; ')}. `,
-        isTogether && [html('button', { type: 'button', onclick: () => this.#relax(all) }, all.length > 1 ? 'Relax these limits together' : 'Relax this limit'), ' '],
-        html('button', { type: 'button', class: 'link', onclick: () => this.front.onOpen({ ...miss, name: 'Nearest drive', label }) }, 'Open it as design'),
+        `${t('find.nearest', { missed: missed.join(t('list.semicolon')) })} `,
+        isTogether && [html('button', { type: 'button', onclick: () => this.#relax(all) }, counted('find.relax_together', all.length)), ' '],
+        html('button', { type: 'button', class: 'link', onclick: () => this.front.onOpen({ ...miss, name: t('find.nearest_drive'), label }) }, t('find.open_it')),
       ),
     );
   }
@@ -232,31 +233,29 @@ export class Find {
         'tr',
         { class: limit.binds > 0 && 'binds' },
         html('th', { scope: 'row' }, limitInWords(limit, this.quantities)),
-        html('td', { class: 'numeric number' }, counted(limit.fell, scan.variants), bar),
+        html('td', { class: 'numeric number' }, shareOf(limit.fell, scan.variants), bar),
         html('td', { class: 'numeric number' }, number(limit.fell_alone, 9)),
-        html('td', { class: 'numeric number' }, front.length > 0 && limit.bound !== 'is' ? `${limit.binds} of ${front.length}` : '–'),
+        html('td', { class: 'numeric number' }, front.length > 0 && limit.bound !== 'is' ? t('find.close_to', { count: limit.binds, all: front.length }) : '–'),
       );
     });
     this.reasons.replaceChildren(
-      html('header', {}, html('h2', { id: 'reasons-title' }, 'What limits the drives')),
-      html('p', {}, `Before the search ${number(scan.variants, 9)} variants were spread evenly over all that is free. The table counts those that each limit stopped; ${counted(scan.impossible, scan.variants)} were no drive at all.`),
+      html('header', {}, html('h2', { id: 'reasons-title' }, t('find.limits'))),
+      html('p', {}, t('find.scan', { variants: number(scan.variants, 9), impossible: shareOf(scan.impossible, scan.variants) })),
       html(
         'div',
-        { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': 'Limits and what fell to them' },
-        html('table', { class: 'drives reasons-table' }, html('thead', {}, html('tr', {}, ['Limit', 'Stopped by it', 'By it alone', 'Drives found close to it'].map((text, index) => html('th', { scope: 'col', class: index > 0 && 'numeric' }, text)))), html('tbody', {}, rows)),
+        { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': t('find.limits_table') },
+        html('table', { class: 'drives reasons-table' }, html('thead', {}, html('tr', {}, [t('find.limit'), t('find.stopped'), t('find.alone'), t('find.close')].map((text, index) => html('th', { scope: 'col', class: index > 0 && 'numeric' }, text)))), html('tbody', {}, rows)),
       ),
-      ...(scan.reasons.length === 0 ? [] : [html('details', {}, html('summary', {}, 'Why variants were no drive at all'), html('ul', { class: 'plain' }, scan.reasons.map(({ variants, detail }) => html('li', {}, `${number(variants, 9)}, such as: ${sentence(readable(detail))}`))))]),
-      ...(front.length > 0 ? without.map((miss) => html('details', {}, html('summary', {}, `Nothing found: ${miss.label}`), this.#missNote(miss, false))) : []),
+      ...(scan.reasons.length === 0 ? [] : [html('details', {}, html('summary', {}, t('find.why_none')), html('ul', { class: 'plain' }, scan.reasons.map(({ variants, ...reason }) => html('li', {}, t('study.such_as', { count: number(variants, 9), reason: sentence(detailOf(reason)) })))))]),
+      ...(front.length > 0 ? without.map((miss) => html('details', {}, html('summary', {}, t('find.nothing_found', { label: miss.label })), this.#missNote(miss, false))) : []),
     );
   }
 }
 
-const capital = (text) => text[0].toUpperCase() + text.slice(1);
-
 /** What will stand where nothing was looked for yet. */
 function previewOf() {
-  const { root, plot, x, y } = axes(420, 200, { label: 'Outer diameter, mm', min: 80, max: 120 }, { label: 'Torque capacity, N·m', min: 150, max: 450 });
+  const { root, plot, x, y } = axes(420, 200, { label: t('find.preview.x'), min: 80, max: 120 }, { label: t('find.preview.y'), min: 150, max: 450 });
   for (let mm = 88; mm < 118; mm += 3) plot.append(svg('circle', { class: 'curve-dot', cx: x(mm), cy: y(200 + 6.2 * (mm - 88)), r: 4.5 }));
-  const parts = ['A chart of the best trade-offs: each mark is a drive that meets all limits.', 'The chosen drive with its picture and figures. It opens as a design.', 'A table of the drives, to compare two of them.', 'The limits that stop better drives. If no drive is found: the limit to relax, and to what.'];
-  return html('section', { class: 'panel preview', 'aria-label': 'What the search will show' }, html('p', {}, 'Press “Find drives”. You will see here:'), html('ol', {}, parts.map((text) => html('li', {}, text))), html('div', { 'aria-hidden': 'true' }, html('p', { class: 'none' }, 'Example'), root));
+  const shown = [t('find.preview.chart'), t('find.preview.drive'), t('find.preview.table'), t('find.preview.limits')];
+  return html('section', { class: 'panel preview', 'aria-label': t('find.preview.label') }, html('p', {}, t('find.preview.press')), html('ol', {}, shown.map((text) => html('li', {}, text))), html('div', { 'aria-hidden': 'true' }, html('p', { class: 'none' }, t('find.preview.example')), root));
 }

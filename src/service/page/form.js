@@ -1,62 +1,44 @@
-// The form, built from the field table in design.js, with problems and findings at the fields that they point at.
+// The form, built from a table of fields, with problems and findings at the fields that they point at.
 
-import { GROUPS, at, changed, fieldsOf, fullLabel, isOn, isSame, keptBy, kindOf } from './design.js';
+import { at, changed, isSame } from './design.js';
+import { explanationOf, fullLabel, isOn, keptBy, kindOf } from './field.js';
+import { FieldNotes, idOf } from './field-notes.js';
+import { GROUPS } from './fields.js';
 import { linesOf, linesRead } from './lines.js';
-import { html, setAttributes, setChildren, setProperties, setText, symbol } from './dom.js';
-import { explanation, sentence, titleOf } from './findings.js';
+import { html, setProperties, setText, symbol } from './dom.js';
 import { number, typed } from './format.js';
 import { remedyOf } from './remedies.js';
 import { inputDifferences } from './report.js';
+import { Slider, niceStep, rounded } from './slider.js';
 import { TERMS, explained } from './terms.js';
-import { explanationOf } from './texts.en.js';
-
-/** Faults whose limit is itself a value that would do. */
-const LIMIT_WOULD_DO = new Set(['tooth_difference', 'installed_no_divisor', 'out_of_range', 'clearance_not_monotone']);
-
-const SLIDER_STEPS = 250;
-
-/** Sizes that a slider can span; beyond them no design is possible. */
-const SPANNED = { least: 1e-12, most: 1e15 };
-
-const idOf = (pointer, what) => `${what}${pointer.replaceAll('/', '-')}`;
-
-/** The power of ten times 1, 2 or 5 next below a size. */
-function niceStep(size) {
-  const power = 10 ** Math.floor(Math.log10(size));
-  return [5, 2, 1].map((digit) => digit * power).find((step) => step <= size * 1.0001) ?? power;
-}
-
-const rounded = (value, step) => {
-  const places = Math.min(100, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
-  return Number((step * Math.round(value / step)).toFixed(places));
-};
+import { SERVICE, labelled, t } from './texts.js';
 
 export class Form {
   #fields = new Map();
-  #notes = new Map();
   #groups = [];
-  #built = new Map();
-  /** The field whose slider is held: as long as it is, nothing moves under the pointer. */
-  #held;
+  /** Whether a slider is held: as long as it is, nothing moves under the pointer. */
+  #held = false;
   #onEdit;
   #onEnd;
   #design = {};
   #answers = {};
-  #findings = [];
   #materials = [];
   #fillings = [];
-  /** What the last edit changed beside its own field: `{ pointer, differences }`. */
-  #told;
 
   /** `onEdit(design, gesture)` at each change; changes of one gesture are one step to undo; `onEnd()` ends it; `onSearch(design)` looks for a drive
    *  like it. All fields stand below the pointer `root`. */
   constructor(container, { onEdit, onEnd, onSearch }, groups = GROUPS, root = '') {
     this.container = container;
-    this.groups = groups;
     this.#onEdit = onEdit;
     this.#onEnd = onEnd;
-    this.onSearch = onSearch;
-    const general = this.#notesFor(root, container);
+    this.notes = new FieldNotes(container, this.#fields, this.#groups, {
+      isHeld: () => this.isHeld,
+      fix: (pointer, value) => this.#fix(pointer, value),
+      keepOnly: (place, field) => this.#keepOnly(place, field),
+      search: () => onSearch(this.#design),
+      remedyButton: (finding) => this.remedyButton(finding),
+    });
+    const general = this.notes.add(root, container);
     general.classList.add('general');
     for (const group of groups) container.append(this.#buildGroup(group));
     // Wherever the pointer is let go.
@@ -69,21 +51,14 @@ export class Form {
   }
 
   get isHeld() {
-    return this.#held !== undefined;
+    return this.#held;
   }
 
   #release() {
     if (!this.#held) return;
-    this.#held = undefined;
-    this.#renderNotes();
+    this.#held = false;
+    this.notes.show();
     this.#onEnd();
-  }
-
-  #notesFor(pointer, parent) {
-    const notes = html('div', { class: 'notes', id: idOf(pointer, 'notes') });
-    this.#notes.set(pointer, notes);
-    parent.append(notes);
-    return notes;
   }
 
   #buildGroup(group) {
@@ -95,7 +70,7 @@ export class Form {
     );
     if (group.hint) details.append(html('p', { class: 'hint' }, group.hint));
     // A field that is the whole group has the group's notes too.
-    if (!(group.fields ?? []).some((field) => field.pointer === group.pointer)) this.#notesFor(group.pointer, details);
+    if (!(group.fields ?? []).some((field) => field.pointer === group.pointer)) this.notes.add(group.pointer, details);
     for (const part of group.parts ?? [group]) {
       const set = html('div', { class: 'set', role: 'group', 'aria-label': part.title });
       if (group.parts) set.append(html('h4', {}, part.title), part.hint ? html('p', { class: 'hint' }, part.hint) : '');
@@ -109,7 +84,7 @@ export class Form {
 
   /** What fills in a part's numbers by name; it is hidden until there are names. */
   #buildFilling({ filled, title }) {
-    const select = html('select', { 'aria-label': `${title}: fill in a material` });
+    const select = html('select', { 'aria-label': t('form.material', { part: title }) });
     const source = html('p', { class: 'hint', hidden: true });
     const element = html('div', { class: 'filling', hidden: true }, select, source);
     select.addEventListener('change', () => {
@@ -117,7 +92,8 @@ export class Form {
       const { youngs_modulus_gpa, poissons_ratio, elasticity_source, allowable_stress_mpa: allowable, allowable_stress_source } = material;
       this.#edit(filled, { youngs_modulus_gpa, poissons_ratio });
       this.setDesign(this.#design);
-      setText(source, `${elasticity_source}.${allowable === undefined ? ' No allowable Hertz stress is published.' : ` Allowable stress ${number(allowable)} MPa: ${allowable_stress_source}.`}`);
+      const given = { source: elasticity_source, stress: number(allowable), stress_source: allowable_stress_source };
+      setText(source, allowable === undefined ? t('form.no_allowable', given) : t('form.allowable', given));
       source.hidden = false;
       select.value = '';
       this.#onEnd();
@@ -130,7 +106,7 @@ export class Form {
   offerMaterials(materials) {
     this.#materials = materials;
     for (const { element, select } of this.#fillings) {
-      select.replaceChildren(html('option', { value: '' }, 'Fill in a material…'), ...materials.map(({ name, title }) => html('option', { value: name }, title)));
+      select.replaceChildren(html('option', { value: '' }, t('form.fill_in')), ...materials.map(({ name, title }) => html('option', { value: name }, SERVICE.materials?.[name] ?? title)));
       element.hidden = materials.length === 0;
     }
   }
@@ -158,7 +134,7 @@ export class Form {
   /** Takes another document, and tells what changes beside the field that was edited. */
   #replace(design, pointer) {
     const isOwn = (other) => other === pointer || other.startsWith(`${pointer}/`);
-    this.#told = { pointer, differences: inputDifferences(design, this.#design).filter(({ pointer: other }) => !isOwn(other)) };
+    this.notes.told = { pointer, differences: inputDifferences(design, this.#design).filter(({ pointer: other }) => !isOwn(other)) };
     this.#design = design;
     this.#onEdit(design, pointer);
   }
@@ -202,7 +178,7 @@ export class Form {
     const element = html('div', { class: 'field choice' }, label, select);
     // Where there is nothing to choose, nothing is asked.
     if (field.options.length === 1) for (const part of [label, select]) part.hidden = true;
-    this.#notesFor(field.pointer, element);
+    this.notes.add(field.pointer, element);
     this.#fields.set(field.pointer, { field, element, input: select });
     return element;
   }
@@ -226,7 +202,7 @@ export class Form {
       this.#onEnd();
     });
     const element = html('div', { class: 'field flag' }, input, this.#named(field, html('label', { for: id }, field.label)));
-    this.#notesFor(field.pointer, element);
+    this.notes.add(field.pointer, element);
     this.#fields.set(field.pointer, { field, element, input });
     return element;
   }
@@ -259,12 +235,12 @@ export class Form {
       spellcheck: 'false',
       'aria-describedby': `${field.unit ? `${idOf(field.pointer, 'unit')} ` : ''}${idOf(field.pointer, 'notes')}`,
     });
-    const label = html('label', { for: id }, field.of && html('span', { class: 'hidden' }, `${field.of}: `), field.label, field.symbol && [' ', symbol(field.symbol)]);
+    const label = html('label', { for: id }, field.of && html('span', { class: 'hidden' }, labelled(field.of, '')), field.label, field.symbol && [' ', symbol(field.symbol)]);
     const unit = html('span', { class: 'unit', id: idOf(field.pointer, 'unit') }, field.unit ?? '');
     const element = html('div', { class: 'field number-field' }, this.#named(field, label), html('span', { class: 'entry' }, input, unit));
     const entry = { field, element, input };
-    if (field.slider) this.#addSlider(entry);
-    this.#notesFor(field.pointer, element);
+    if (field.slider) entry.slider = this.#buildSlider(entry);
+    this.notes.add(field.pointer, element);
     this.#fields.set(field.pointer, entry);
     input.addEventListener('input', () => {
       // What others follow from waits until it is whole: the first digit of a ratio is another one.
@@ -293,16 +269,33 @@ export class Form {
     const unit = html('span', { class: 'unit', id: idOf(field.pointer, 'unit') }, order);
     const element = html('div', { class: 'field lines' }, this.#named(field, html('label', { for: id }, field.label)), unit, input);
     const entry = { field, element, input };
-    this.#notesFor(field.pointer, element);
+    this.notes.add(field.pointer, element);
     this.#fields.set(field.pointer, entry);
     input.addEventListener('input', () => {
       const { value, fault } = linesRead(field, input.value, at(this.#design, field.pointer));
       entry.fault = fault;
-      if (fault !== undefined) this.#renderNotes();
+      if (fault !== undefined) this.notes.show();
       else this.#edit(field.pointer, value, field.adjust);
     });
     input.addEventListener('change', () => this.#onEnd());
     return element;
+  }
+
+  #buildSlider(entry) {
+    const { field, element } = entry;
+    const slider = new Slider(field, {
+      onInput: (value) => {
+        entry.input.value = String(value);
+        entry.fault = undefined;
+        this.#edit(field.pointer, value);
+      },
+      onHold: () => {
+        this.#held = true;
+      },
+      onEnd: () => this.#onEnd(),
+    });
+    element.append(...slider.elements);
+    return slider;
   }
 
   /** Takes what was typed into the document, or says at the field why not. */
@@ -310,7 +303,7 @@ export class Form {
     const { field, input } = entry;
     const { value, fault } = typed(input.value, field.unit);
     entry.fault = fault ?? (value === undefined ? undefined : field.refuses?.(value, this.#design));
-    if (entry.fault !== undefined) this.#renderNotes();
+    if (entry.fault !== undefined) this.notes.show();
     else if (field.derived) {
       entry.isEdited = false;
       if (value !== undefined) this.#replace(field.derived.write(this.#design, value), field.pointer);
@@ -321,50 +314,16 @@ export class Form {
     const { field, input } = entry;
     const { value } = typed(input.value, field.unit);
     if (value === undefined) return;
-    const step = field.step ?? entry.step ?? (field.whole ? 1 : niceStep(Math.max(Math.abs(value), SPANNED.least) / 100));
+    const step = field.step ?? entry.slider?.step ?? (field.whole ? 1 : niceStep(value));
     const next = field.next?.(value, sense) ?? rounded(value + sense * step, step);
     input.value = String(next);
     entry.isEdited = true;
     this.#take(entry);
   }
 
-  #addSlider(entry) {
-    const { field, element } = entry;
-    entry.slider = html('input', { type: 'range', 'aria-label': `${field.label}, slider` });
-    entry.mark = html('span', { class: 'mark', hidden: true, 'aria-hidden': 'true' });
-    entry.markText = html('span', { class: 'mark-text' });
-    element.append(html('div', { class: 'slider' }, entry.slider, entry.mark), field.mark ? entry.markText : '');
-    entry.slider.addEventListener('input', () => {
-      const value = rounded(Number(entry.slider.value), entry.step);
-      entry.input.value = String(value);
-      entry.fault = undefined;
-      this.#edit(field.pointer, value);
-    });
-    entry.slider.addEventListener('pointerdown', () => {
-      this.#held = entry;
-    });
-    entry.slider.addEventListener('change', () => {
-      // At the end of its way the slider makes room beyond.
-      const { value, min, max } = entry.slider;
-      if (value === min || value === max) this.#span(entry, Number(value));
-      this.#onEnd();
-    });
-  }
-
-  #span(entry, value) {
-    const half = Math.abs(value) * entry.field.slider || 1;
-    entry.step = niceStep((2 * half) / SLIDER_STEPS);
-    const low = Math.max(rounded(value - half, entry.step), entry.step);
-    const high = rounded(value + half, entry.step);
-    entry.slider.min = low;
-    entry.slider.max = high;
-    entry.slider.step = entry.step;
-    entry.slider.value = value;
-  }
-
   /** Shows a document; sliders span anew around its values where `respan` says that it is another one. */
   setDesign(design, { respan = false } = {}) {
-    if (!isSame(design, this.#design)) this.#told = undefined;
+    if (!isSame(design, this.#design)) this.notes.told = undefined;
     this.#design = design;
     for (const entry of this.#fields.values()) this.#showValue(entry, respan);
     for (const { group, summary } of this.#groups) setText(summary, group.summary?.(design) ?? '');
@@ -416,134 +375,20 @@ export class Form {
     // What is being typed stays as it is spelled, as long as it means the value.
     const isShown = isTyping && (field.derived ? entry.isEdited : typed(input.value, field.unit).value === (at(design, field.pointer) ?? undefined));
     if (!isShown && entry.fault === undefined) setProperties(input, { value: typeof value === 'number' ? String(value) : '' });
-    setProperties(input, { placeholder: String(field.optional?.(design, this.#answers) ?? field.preset ?? (field.derived ? '' : 'wanted')) });
-    if (entry.slider) {
-      const isGiven = typeof value === 'number' && value >= SPANNED.least && value <= SPANNED.most;
-      setProperties(entry.slider.parentElement, { hidden: !isGiven });
-      if (!isGiven) return;
-      const { min, max } = entry.slider;
-      if (respan || entry.step === undefined || value < Number(min) || value > Number(max)) this.#span(entry, value);
-      else setProperties(entry.slider, { value: String(value) });
-      setAttributes(entry.slider, { 'aria-valuetext': `${value} ${field.unit}` });
-    }
+    setProperties(input, { placeholder: String(field.optional?.(design, this.#answers) ?? field.preset ?? (field.derived ? '' : t('empty.wanted'))) });
+    entry.slider?.show(value, respan);
   }
 
   /** Shows what the service says: the last answers that there are, why the document has none, findings. */
   setResult(answers, reasons, findings) {
     this.#answers = answers;
-    this.reasons = reasons;
-    this.#findings = findings;
+    Object.assign(this.notes, { reasons, findings });
     for (const entry of this.#fields.values()) {
       const { field } = entry;
       if (field.optional) setProperties(entry.input, { placeholder: String(field.optional(this.#design, answers)) });
-      if (field.mark) this.#showMark(entry, field.mark(answers));
+      if (field.mark) entry.slider.showMark(field.mark(answers));
     }
-    this.#renderNotes();
-  }
-
-  #showMark({ slider, mark, markText, field }, { value, text }) {
-    setText(markText, value === undefined ? text : `${text} ${number(value, 4)} ${field.unit}`);
-    const share = (value - Number(slider.min)) / (Number(slider.max) - Number(slider.min));
-    setProperties(mark, { hidden: !(share >= 0 && share <= 1) });
-    mark.style.setProperty('--at', share);
-  }
-
-  /** The field or group that stands nearest above a pointer. */
-  #placeOf(pointer) {
-    let place = pointer;
-    while (place && (!this.#notes.has(place) || this.#fields.get(place)?.element.hidden)) {
-      place = place.slice(0, place.lastIndexOf('/'));
-    }
-    return place;
-  }
-
-  /** What a field without a value wants, where it has to have one. */
-  #wantOf({ field, element, input }) {
-    const isWanted = !field.kind || field.kind === 'number';
-    if (!isWanted || field.optional || field.derived || field.preset !== undefined || element.hidden || input.value !== '') return undefined;
-    const what = field.label[0].toLowerCase() + field.label.slice(1);
-    return `Wanted here: the ${what}, ${field.whole ? 'a whole number' : `a number in ${field.unit}`}${field.likely === undefined ? '' : `, such as ${field.likely}`}.`;
-  }
-
-  #renderNotes() {
-    const contents = new Map([...this.#notes.keys()].map((pointer) => [pointer, []]));
-    const worst = new Map();
-    const built = new Map();
-    // What was built stays as long as it is wanted, with the focus that may be in it.
-    const add = (pointer, severity, key, build) => {
-      const id = `${pointer} ${key}`;
-      const note = this.#built.get(id) ?? build();
-      built.set(id, note);
-      contents.get(pointer).push(note);
-      if (!worst.has(pointer)) worst.set(pointer, severity);
-    };
-    const say = (pointer, text) => add(pointer, 'problem', text, () => ({ element: html('p', { class: 'note problem' }, text) }));
-    for (const [pointer, entry] of this.#fields) {
-      const text = entry.fault ?? this.#wantOf(entry);
-      if (text) say(pointer, text);
-    }
-    for (const reason of this.reasons ?? []) {
-      const place = this.#placeOf(reason.pointer);
-      // An empty field has said so itself.
-      if (reason.code === 'missing_field' && place === reason.pointer && contents.get(place).length > 0) continue;
-      add(place, 'problem', JSON.stringify(reason), () => ({ element: this.#problemNote(reason, place) }));
-    }
-    if (this.#told?.differences.length > 0) add(this.#placeOf(this.#told.pointer), 'info', JSON.stringify(this.#told), () => ({ element: this.#toldNote(this.#told) }));
-    for (const finding of this.#findings) {
-      for (const place of new Set(finding.pointers.map((pointer) => this.#placeOf(pointer)))) {
-        add(place, finding.severity, finding.key, () => this.#findingNote(finding, place));
-        built.get(`${place} ${finding.key}`).show(finding);
-      }
-    }
-    for (const [pointer, entry] of this.#fields) {
-      entry.element.dataset.state = worst.get(pointer) ?? '';
-      if (worst.get(pointer) === 'problem') entry.input.setAttribute('aria-invalid', 'true');
-      else entry.input.removeAttribute('aria-invalid');
-    }
-    // Colours follow at once; words, which take room, wait until the slider is let go.
-    if (this.#held) return;
-    this.#built = built;
-    this.#inPlace(() => {
-      for (const [pointer, notes] of contents) setChildren(this.#notes.get(pointer), notes.map((note) => note.element));
-      for (const { group, details } of this.#groups) {
-        const pointers = [group.pointer, ...[...fieldsOf(group)].map((field) => field.pointer)];
-        if (pointers.some((pointer) => worst.get(pointer) === 'problem')) details.open = true;
-      }
-    });
-  }
-
-  /** Keeps the field that has the focus where it is on the screen while others around it grow or shrink. */
-  #inPlace(change) {
-    const anchor = this.container.contains(document.activeElement) ? document.activeElement : undefined;
-    const before = anchor?.getBoundingClientRect().top;
-    change();
-    if (!anchor?.isConnected) return;
-    const moved = anchor.getBoundingClientRect().top - before;
-    const scrolls = this.container.scrollHeight > this.container.clientHeight ? this.container : document.scrollingElement;
-    if (moved !== 0) scrolls.scrollTop += moved;
-  }
-
-  #problemNote(reason, place) {
-    const { pointer, code, detail, limit } = reason;
-    const missing = pointer !== place && pointer ? `${pointer}: ` : '';
-    const note = html('p', { class: 'note problem' }, `${missing}${sentence(detail)} `);
-    if (code === 'conflicting_fields') {
-      for (const { field } of this.#fields.get(place)?.field.options ?? []) {
-        note.append(html('button', { type: 'button', class: 'link', onclick: () => this.#keepOnly(place, field) }, `Keep ${field.label.toLowerCase()}`), ' ');
-      }
-    } else if (code === 'unknown_field') {
-      note.append(html('button', { type: 'button', class: 'link', onclick: () => this.#fix(pointer, undefined) }, 'Remove it'));
-    } else if (LIMIT_WOULD_DO.has(code) && limit !== undefined && pointer === place && !pointer.endsWith('poissons_ratio')) {
-      note.append(html('button', { type: 'button', class: 'link', onclick: () => this.#fix(pointer, limit) }, `Set to ${number(limit)}`));
-    }
-    return note;
-  }
-
-  /** What an edit changed beside its own field. */
-  #toldNote({ pointer, differences }) {
-    const list = differences.map(({ label, value, reference }) => `${label[0].toLowerCase()}${label.slice(1)} ${reference} → ${value}`).join(', ');
-    const search = this.#fields.get(pointer)?.field.offersSearch && html('button', { type: 'button', class: 'link', onclick: () => this.onSearch(this.#design) }, 'Find a drive with this ratio');
-    return html('p', { class: 'note info told-note' }, `Also changed: ${list}. `, search && ['Sizes stay as they are. ', search]);
+    this.notes.show();
   }
 
   #fix(pointer, value) {
@@ -564,44 +409,11 @@ export class Form {
     this.goTo(pointer);
   }
 
-  #findingNote(first, place) {
-    const { key, pointers } = first;
-    const panel = html('div', { id: `${idOf(place, 'why')}-${key}`, hidden: true });
-    const button = html('button', { type: 'button', class: 'finding', 'aria-expanded': 'false', 'aria-controls': panel.id }, titleOf(first));
-    button.addEventListener('click', () => {
-      panel.hidden = !panel.hidden;
-      button.setAttribute('aria-expanded', String(!panel.hidden));
-    });
-    const remedy = html('div', {});
-    const element = html('div', {}, button, remedy, panel);
-    // The first field is the one to change first; the others only refer to the finding.
-    const isMinor = this.#placeOf(pointers[0]) !== place;
-    let shown;
-    const show = (finding) => {
-      if (isSame(finding, shown)) return;
-      shown = finding;
-      element.className = `note ${finding.severity}${isMinor ? ' minor' : ''}`;
-      setChildren(remedy, isMinor ? [] : [this.remedyButton(finding)].filter(Boolean));
-      panel.replaceChildren(explanation(finding, (pointer) => this.labelOf(pointer), (pointer) => this.goTo(pointer)));
-    };
-    return { element, show };
-  }
-
   labelOf(pointer) {
-    const place = this.#placeOf(pointer);
-    const { field } = this.#fields.get(place) ?? {};
-    const group = this.groups.find((candidate) => candidate.pointer === place);
-    return field?.name ?? (field && fullLabel(field)) ?? group?.title ?? pointer;
+    return this.notes.labelOf(pointer);
   }
 
-  /** Leads to a field: opens its group, moves the focus there. */
   goTo(pointer) {
-    const place = this.#placeOf(pointer);
-    const visible = [...this.#fields.entries()].find(([key, { element, input }]) => key.startsWith(place) && key.split('/').length > 2 && !element.hidden && !input.hidden);
-    const { element, input } = this.#fields.get(place)?.field.kind === 'number' ? this.#fields.get(place) : (visible?.[1] ?? {});
-    if (!element) return;
-    element.closest('details').open = true;
-    input.focus({ preventScroll: true });
-    element.scrollIntoView({ block: 'center', behavior: 'auto' });
+    this.notes.goTo(pointer);
   }
 }

@@ -1,5 +1,7 @@
 // Numbers as a designer reads them: enough significant digits to tell designs apart, no more.
 
+import { t } from './texts.js';
+
 const MINUS = '\u2212';
 const THIN_SPACE = '\u202f';
 const SUPERSCRIPTS = '⁰¹²³⁴⁵⁶⁷⁸⁹';
@@ -64,9 +66,9 @@ export function typed(text, unit) {
   const plainText = text.normalize('NFKC').replaceAll('。', '.').trim();
   const compact = withoutUnit(plainText, unit).replace(/(?<=\d)[\s\u00a0\u2009\u202f](?=\d)/g, '').replace(MINUS, '-');
   if (compact === '') return { value: undefined };
-  if (THOUSANDS.test(compact)) return { fault: `“${compact}” can mean ${compact.replace(',', '.')} or ${compact.replace(',', '')}: write which. The last number stands.` };
+  if (THOUSANDS.test(compact)) return { fault: t('fault.ambiguous', { text: compact, point: compact.replace(',', '.'), thousands: compact.replace(',', '') }) };
   const plain = compact.replace(WITH_COMMA, '$1.$2');
-  if (!PLAIN.test(plain)) return { fault: `This is not a number${unit ? ` in ${unit}` : ''}; the last one stands.` };
+  if (!PLAIN.test(plain)) return { fault: unit ? t('fault.not_a_number_in', { unit }) : t('fault.not_a_number') };
   const value = Number(plain);
-  return Number.isFinite(value) ? { value } : { fault: 'This is more than a number can hold; the last one stands.' };
+  return Number.isFinite(value) ? { value } : { fault: t('fault.too_large') };
 }

@@ -8,15 +8,16 @@ import { difference } from './format.js';
 import { picture } from './picture.js';
 import { limitInWords } from './reasons.js';
 import { inputDifferences } from './report.js';
+import { counted, labelled, t } from './texts.js';
 
 const HEIGHT = 340;
 /** Drives of one kind have one mark: `d` around the origin. */
 const MARKS = ['M5 0A5 5 0 1 1 -5 0A5 5 0 1 1 5 0Z', 'M-4.5 -4.5H4.5V4.5H-4.5Z', 'M0 -6L5.5 4.5H-5.5Z', 'M0 -6.5L6 0L0 6.5L-6 0Z'];
 
 const INPUTS = [
-  { label: 'Slots', read: (design) => at(design, '/drive/teeth/count') },
-  { label: 'Ring teeth', read: (design) => at(design, '/drive/ring/teeth') },
-  { label: 'Tooth radius, mm', read: (design) => at(design, '/drive/teeth/radius_mm') },
+  { label: t('front.slots'), read: (design) => at(design, '/drive/teeth/count') },
+  { label: t('label./drive/ring/teeth'), read: (design) => at(design, '/drive/ring/teeth') },
+  { label: t('front.tooth_radius'), read: (design) => at(design, '/drive/teeth/radius_mm') },
 ];
 
 const mark = (search) => ({ d: MARKS[search % MARKS.length], class: `mark-of mark-${search % MARKS.length}` });
@@ -32,10 +33,10 @@ export class Front {
   /** `onOpen(found)` and `onOpenBoth(found, reference)` when a drive is taken as design. */
   constructor(container, { quantities, onOpen, onOpenBoth }) {
     Object.assign(this, { quantities, onOpen, onOpenBoth });
-    this.title = html('h2', { id: 'front-title', tabindex: '-1' }, 'Drives');
-    this.xChoice = new Choice('Across', () => this.#draw());
-    this.yChoice = new Choice('up', () => this.#draw());
-    this.chart = html('div', { class: 'study-chart', role: 'img', 'aria-label': 'The drives by two of their figures; the table below has them too' });
+    this.title = html('h2', { id: 'front-title', tabindex: '-1' });
+    this.xChoice = new Choice(t('front.across'), () => this.#draw());
+    this.yChoice = new Choice(t('front.up'), () => this.#draw());
+    this.chart = html('div', { class: 'study-chart', role: 'img', 'aria-label': t('front.chart') });
     this.key = html('ul', { class: 'key marks-key' });
     this.card = html('div', { class: 'drive-card' });
     this.figures = html('div', { class: 'drive-figures' });
@@ -46,7 +47,7 @@ export class Front {
       { class: 'panel', 'aria-labelledby': 'front-title', hidden: true },
       html('header', {}, this.title, html('div', { class: 'ask-row' }, this.xChoice.element, this.yChoice.element)),
       html('div', { class: 'front' }, html('div', { class: 'drive-chart' }, this.chart, this.key), this.card, this.figures),
-      html('div', { class: 'scroll drives-scroll', tabindex: '0', role: 'region', 'aria-label': 'Table of drives' }, this.table),
+      html('div', { class: 'scroll drives-scroll', tabindex: '0', role: 'region', 'aria-label': t('front.table') }, this.table),
     );
     container.append(this.panel, this.comparison);
     this.chart.addEventListener('pointerdown', (event) => this.#pick(event));
@@ -67,7 +68,7 @@ export class Front {
       this.comparison.hidden = true;
       return;
     }
-    setText(this.title, front.length === 1 ? 'One drive' : `${front.length} drives`);
+    setText(this.title, counted('front.drives', front.length));
     const names = Object.keys(front[0].quantities);
     const own = goals.map(({ quantity }) => quantity);
     const ordered = [...own, ...names.filter((name) => !own.includes(name))].filter((name) => !this.quantities.get(name).is_flag);
@@ -85,10 +86,10 @@ export class Front {
   #build() {
     const goals = this.#goals.map(({ quantity }) => quantity);
     const isMixed = new Set(this.#front.map(({ search }) => search)).size > 1;
-    const head = ['Drive', '', ...(isMixed ? ['Kind'] : []), ...goals.map((name) => this.quantities.headed(name)), ...INPUTS.map(({ label }) => label), 'Compare'];
+    const head = [t('front.drive'), '', ...(isMixed ? [t('front.kind')] : []), ...goals.map((name) => this.quantities.headed(name)), ...INPUTS.map(({ label }) => label), t('front.compare')];
     this.#rows = this.#front.map((found, index) => {
       const name = html('button', { type: 'button', class: 'link', onclick: () => this.#choose(index) }, found.name);
-      const check = html('input', { type: 'checkbox', 'aria-label': `Compare ${found.name.toLowerCase()}`, onchange: () => this.#toggle(index) });
+      const check = html('input', { type: 'checkbox', 'aria-label': t('front.compare_it', { name: found.name.toLowerCase() }), onchange: () => this.#toggle(index) });
       const row = html(
         'tr',
         {},
@@ -157,15 +158,15 @@ export class Front {
       this.cardPicture,
       html('h3', {}, found.name),
       html('p', { class: 'none' }, found.label),
-      html('p', {}, found.heldBy.length > 0 ? `Close to its limits: ${found.heldBy.map((limit) => limitInWords(limit, this.quantities, { isWithin: true })).join('; ')}.` : 'Not close to any limit.'),
+      html('p', {}, found.heldBy.length > 0 ? t('front.close', { limits: found.heldBy.map((limit) => limitInWords(limit, this.quantities, { isWithin: true })).join(t('list.semicolon')) }) : t('front.not_close')),
       html(
         'div',
         { class: 'actions' },
-        html('button', { type: 'button', class: 'primary', onclick: () => this.onOpen(found) }, 'Open as design'),
-        html('button', { type: 'button', 'aria-pressed': String(isCompared), onclick: () => this.#toggle(index) }, 'Compare'),
+        html('button', { type: 'button', class: 'primary', onclick: () => this.onOpen(found) }, t('front.open')),
+        html('button', { type: 'button', 'aria-pressed': String(isCompared), onclick: () => this.#toggle(index) }, t('front.compare')),
       ),
     );
-    this.figures.replaceChildren(html('h3', {}, `${found.name} in figures`), html('dl', { class: 'figures' }, figures));
+    this.figures.replaceChildren(html('h3', {}, t('front.figures_of', { name: found.name })), html('dl', { class: 'figures' }, figures));
     this.#mark();
   }
 
@@ -180,9 +181,9 @@ export class Front {
     const [one, other] = this.#compared.map((index) => this.#front[index]);
     this.comparison.hidden = one === undefined;
     if (!one) return;
-    const title = html('h2', { id: 'comparison-title' }, other ? `${one.name} and ${other.name.toLowerCase()}` : `${one.name}, and…`);
+    const title = html('h2', { id: 'comparison-title' }, other ? t('front.pair', { one: one.name, other: other.name.toLowerCase() }) : t('front.and_another', { one: one.name }));
     if (!other) {
-      this.comparison.replaceChildren(html('header', {}, title), html('p', { class: 'none' }, 'Choose another drive to compare it with.'));
+      this.comparison.replaceChildren(html('header', {}, title), html('p', { class: 'none' }, t('front.choose_another')));
       return;
     }
     // At one scale: as large as the larger of the two.
@@ -194,12 +195,12 @@ export class Front {
     const inputs = inputDifferences(...[one, other].map(({ design }) => legible(design))).map(({ label, value, reference }) => [label, value, reference, '']);
     const body = (title, lines) => html('tbody', {}, html('tr', { class: 'group' }, html('th', { scope: 'colgroup', colspan: 4 }, title)), lines.map(([label, ...cells]) => html('tr', {}, html('th', { scope: 'row' }, label), cells.map((text) => html('td', { class: 'numeric number' }, text)))));
     this.comparison.replaceChildren(
-      html('header', {}, title, html('button', { type: 'button', onclick: () => this.onOpenBoth(other, one) }, `Open ${other.name.toLowerCase()}, ${one.name.toLowerCase()} as reference`)),
-      html('div', { class: 'pair' }, [one, other].map((found) => html('figure', {}, picture(found.design, { isLarge: true, halfMm }), html('figcaption', {}, `${found.name}: ${found.label}`)))),
+      html('header', {}, title, html('button', { type: 'button', onclick: () => this.onOpenBoth(other, one) }, t('front.open_both', { other: other.name.toLowerCase(), one: one.name.toLowerCase() }))),
+      html('div', { class: 'pair' }, [one, other].map((found) => html('figure', {}, picture(found.design, { isLarge: true, halfMm }), html('figcaption', {}, labelled(found.name, found.label))))),
       html(
         'div',
-        { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': 'Comparison of two drives' },
-        html('table', { class: 'drives' }, html('thead', {}, html('tr', {}, html('td', {}), [one.name, other.name, 'Difference'].map((text) => html('th', { scope: 'col', class: 'numeric' }, text)))), body('Figures', rows), body('Inputs that differ', inputs)),
+        { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': t('front.comparison') },
+        html('table', { class: 'drives' }, html('thead', {}, html('tr', {}, html('td', {}), [one.name, other.name, t('comparison.difference')].map((text) => html('th', { scope: 'col', class: 'numeric' }, text)))), body(t('front.figures'), rows), body(t('front.inputs'), inputs)),
       ),
     );
   }

@@ -1,6 +1,7 @@
 // A list of objects with the same few numbers, as text: an object a line, its numbers in the order of the field's columns.
 
 import { typed } from './format.js';
+import { listed, t } from './texts.js';
 
 const keyIn = (item, { key, others = [] }) => [key, ...others].find((name) => item?.[name] !== undefined) ?? key;
 
@@ -28,7 +29,7 @@ export function linesRead({ columns }, text, before) {
       .filter((part) => !columns.some(({ unit }) => unit === part))
       .map((part, place) => typed(part, columns[place]?.unit).value);
     if (numbers.length !== columns.length || numbers.includes(undefined)) {
-      return { fault: `Line ${index + 1} wants ${columns.length} numbers apart by spaces: ${columns.map(({ unit }) => unit).join(', ')}. The last duty stands.` };
+      return { fault: t('fault.lines', { line: index + 1, count: columns.length, units: listed(columns.map(({ unit }) => unit)) }) };
     }
     const old = before?.[index];
     value.push(Object.fromEntries(columns.map((column, at) => [keyIn(old, column), Number((numbers[at] / (column.factor ?? 1)).toPrecision(12))])));

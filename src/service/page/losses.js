@@ -4,18 +4,10 @@ import { USUAL_FRICTION, at, bearingRadiusOf, changed, isSame } from './design.j
 import { html, setText } from './dom.js';
 import { number, withUnit } from './format.js';
 import { ask } from './service.js';
+import { labelled, t } from './texts.js';
 
-const KINDS = [
-  { kind: 'plain', name: 'Teeth on the cam itself' },
-  { kind: 'race', name: 'On a race with a bearing' },
-  { kind: 'rolling', name: 'On a race that does not rub' },
-];
-const PLACES = [
-  { key: 'wave_generator', name: 'cam or race' },
-  { key: 'ring', name: 'ring' },
-  { key: 'carrier', name: 'slots' },
-  { key: 'bearing', name: 'bearing' },
-];
+const KINDS = ['plain', 'race', 'rolling'].map((kind) => ({ kind, name: t(`losses.${kind}`) }));
+const PLACES = ['wave_generator', 'ring', 'carrier', 'bearing'];
 
 /** The friction of a design on one kind of wave generator: its own numbers, and where it has none the usual. */
 function frictionOn(kind, design) {
@@ -45,9 +37,8 @@ const percent = (share) => withUnit(number(100 * share, 3), '%');
 /** In words, what the numbers rest on. */
 function assumed(design) {
   const { wave_generator: race, ring, carrier } = frictionOn('race', design);
-  const coefficients = `${race.coefficient} at the wave generator, ${ring.coefficient} at the ring, ${carrier.coefficient} in the slots, and ${race.bearing_coefficient} of the bearing at ${number(race.bearing_radius_mm, 4)} mm`;
-  const whose = design.friction ? 'this design’s coefficients, and usual ones where it has none' : 'coefficients taken for the comparison, since the design has none';
-  return `With ${whose}: ${coefficients}.`;
+  const coefficients = { wave_generator: race.coefficient, ring: ring.coefficient, carrier: carrier.coefficient, bearing: race.bearing_coefficient, radius: number(race.bearing_radius_mm, 4) };
+  return design.friction ? t('losses.with_own', coefficients) : t('losses.with_usual', coefficients);
 }
 
 export class Losses {
@@ -73,12 +64,12 @@ export class Losses {
     const running = new AbortController();
     this.#running = running;
     const design = this.#design;
-    this.#message = 'Comparing…';
+    this.#message = t('losses.comparing');
     this.#show();
     try {
       const replies = await Promise.all(KINDS.map(({ kind }) => ask('v1/sweep', on(kind, design), { signal: running.signal })));
       const refused = replies.find(({ problem }) => problem)?.problem;
-      this.#message = refused ? `${refused.title}: ${refused.detail}` : '';
+      this.#message = refused ? labelled(refused.title, refused.detail) : '';
       if (!refused) this.#build(design, replies.map(({ answer }) => answer.losses));
     } catch (error) {
       if (running.signal.aborted) return;
@@ -91,15 +82,15 @@ export class Losses {
   #build(design, losses) {
     this.#compared = { design, asked: questionOf(design) };
     const hasPower = losses[0].power_loss_w !== undefined;
-    const heads = ['Wave generator', 'Efficiency, ring fixed', 'Driven from behind', hasPower ? 'Power lost' : undefined, ...PLACES.map(({ name }) => `Lost at the ${name}`)];
+    const heads = [t('part.wave_generator'), t('losses.efficiency'), t('losses.back_driven'), hasPower ? t('losses.power') : undefined, ...PLACES.map((place) => t(`losses.at.${place}`))];
     const rows = KINDS.map(({ kind, name }, index) => {
       const { efficiency, self_locking: locks, loss_ratio: ratio, loss_ratio_by_place: places, power_loss_w: power } = losses[index];
-      const button = html('button', { type: 'button', 'aria-label': `${name}: use it` }, name);
+      const button = html('button', { type: 'button', 'aria-label': t('losses.use', { name }) }, name);
       const cells = [
         html('data', { class: 'number', value: efficiency.ring_fixed }, percent(efficiency.ring_fixed)),
-        locks ? 'locks itself' : html('data', { class: 'number', value: efficiency.ring_fixed_back_driven }, percent(efficiency.ring_fixed_back_driven)),
+        locks ? t('result.locks') : html('data', { class: 'number', value: efficiency.ring_fixed_back_driven }, percent(efficiency.ring_fixed_back_driven)),
         hasPower ? html('data', { class: 'number', value: power }, withUnit(number(power, 3), 'W')) : undefined,
-        ...PLACES.map(({ key }) => html('data', { class: 'number', value: places[key] }, percent((places[key] / ratio) * (1 - efficiency.ring_fixed)))),
+        ...PLACES.map((key) => html('data', { class: 'number', value: places[key] }, percent((places[key] / ratio) * (1 - efficiency.ring_fixed)))),
       ];
       const row = html('tr', { 'data-kind': kind }, html('th', { scope: 'row' }, button), cells.filter((cell) => cell !== undefined).map((cell) => html('td', { class: 'numeric' }, cell)));
       row.addEventListener('click', () => this.onApply(on(kind, this.#design)));
@@ -112,9 +103,9 @@ export class Losses {
   #show() {
     const isStale = this.#compared !== undefined && !isSame(this.#compared.asked, questionOf(this.#design));
     this.panel.classList.toggle('outdated', isStale);
-    setText(this.button, this.#compared ? 'Compare again' : 'Compare');
+    setText(this.button, this.#compared ? t('losses.compare_again') : t('losses.compare'));
     const own = at(this.#design, '/friction/wave_generator/kind');
     for (const row of this.table.querySelectorAll('tbody tr')) row.querySelector('button').setAttribute('aria-pressed', String(row.dataset.kind === own));
-    setText(this.state, this.#message || (isStale ? 'Compared for another design; compare again for this one.' : ''));
+    setText(this.state, this.#message || (isStale ? t('losses.stale') : ''));
   }
 }

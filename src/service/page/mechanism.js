@@ -4,6 +4,7 @@
 import { html, setAttributes, setProperties, setText, svg } from './dom.js';
 import { number, withUnit } from './format.js';
 import { CONTACTS, polar } from './motion.js';
+import { labelled, parts, small, t } from './texts.js';
 
 /** The ring's body beyond its root and the longest arrow, as shares of what is seen; neither is a result. */
 const RING_BODY = 0.045;
@@ -230,8 +231,8 @@ export class Body {
 }
 
 const COLOURINGS = [
-  { key: 'stress', name: 'Contact stress', unit: 'MPa' },
-  { key: 'rubbing', name: 'Pressure times velocity', unit: 'MPa m/s' },
+  { key: 'stress', name: t('plot.stress'), unit: 'MPa' },
+  { key: 'rubbing', name: t('plot.rubbing'), unit: 'MPa m/s' },
 ];
 
 /** Colour of a share of the largest stress: three stops, mixed by the style sheet so that each theme has its own. */
@@ -265,24 +266,24 @@ export class Mechanism {
 
   #buildLegend(onDrawings) {
     this.mostColour = html('span', { class: 'number' });
-    this.colouringName = html('span', {}, 'Tooth’s highest contact stress: 0 ');
+    this.colouringName = html('span', {});
     this.chosenColouring = html(
       'select',
-      { 'aria-label': 'Teeth are coloured by', hidden: true, onchange: () => this.#colourBy() },
+      { 'aria-label': t('mechanism.coloured_by'), hidden: true, onchange: () => this.#colourBy() },
       COLOURINGS.map(({ key, name }) => html('option', { value: key }, name)),
     );
     this.mostForce = html('span', { class: 'number' });
     const contacts = CONTACTS.map(({ key, name }) =>
       html('li', {}, html('span', { class: `swatch part-${key}`, 'aria-hidden': 'true' }), name),
     );
-    this.ghostItem = html('li', { hidden: true }, html('span', { class: 'swatch ghost', 'aria-hidden': 'true' }), 'Reference');
+    this.ghostItem = html('li', { hidden: true }, html('span', { class: 'swatch ghost', 'aria-hidden': 'true' }), t('comparison.reference'));
     this.legend.append(
-      html('ul', { class: 'key' }, contacts, html('li', {}, html('span', { class: 'swatch zone', 'aria-hidden': 'true' }), 'Meshing zones'), this.ghostItem),
+      html('ul', { class: 'key' }, contacts, html('li', {}, html('span', { class: 'swatch zone', 'aria-hidden': 'true' }), t('mechanism.zones')), this.ghostItem),
       html('p', { class: 'scale' }, this.chosenColouring, this.colouringName, html('span', { class: 'ramp', 'aria-hidden': 'true' }), ' ', this.mostColour),
-      html('p', { class: 'scale' }, 'Longest arrow, over the whole period: ', this.mostForce),
+      html('p', { class: 'scale' }, labelled(t('mechanism.longest_arrow'), ''), this.mostForce),
       (this.nominal = html('p', { class: 'nominal', hidden: true })),
     );
-    this.toDrawings = html('button', { type: 'button', class: 'link', onclick: onDrawings }, 'drawings');
+    this.toDrawings = html('button', { type: 'button', class: 'link', onclick: onDrawings }, t('mechanism.drawings'));
   }
 
   /** Takes a new drive; the places follow with the next `render`. */
@@ -326,9 +327,9 @@ export class Mechanism {
   #showNominal({ drawn, undrawn }) {
     setProperties(this.nominal, { hidden: drawn.length === 0 && !undrawn });
     if (this.nominal.hidden) return;
-    const words = ['The picture is the nominal drive.'];
-    if (drawn.length > 0) words.push(` The ${drawn.join(' and ')}, of micrometres, ${drawn[0].endsWith('s') || drawn.length > 1 ? 'are' : 'is'} in the `, this.toDrawings, ', true to size.');
-    if (undrawn) words.push(' The deviations are in the numbers alone.');
+    const words = [t('mechanism.nominal')];
+    if (drawn.length > 0) words.push(' ', ...parts('mechanism.drawn', { what: drawn.map((what) => t(`mechanism.${what}`)).join(t('list.and')), drawings: this.toDrawings }));
+    if (undrawn) words.push(` ${t('mechanism.undrawn')}`);
     this.nominal.replaceChildren(...words);
   }
 
@@ -345,7 +346,7 @@ export class Mechanism {
   #showColouring() {
     setProperties(this.chosenColouring, { hidden: !this.rubs });
     const { key, name, unit } = COLOURINGS.find((candidate) => candidate.key === this.colouring);
-    setText(this.colouringName, this.rubs ? ': 0 ' : `Tooth’s highest ${name[0].toLowerCase()}${name.slice(1)}: 0 `);
+    setText(this.colouringName, labelled(this.rubs ? '' : t('mechanism.highest', { name: small(name) }), '0 '));
     setText(this.mostColour, this.#motion.sweep ? withUnit(number(this.most[key], 4), unit) : '–');
   }
 

@@ -5,13 +5,14 @@
 // Frame: the ring's, x along the middle of a tooth space; angles in degrees, counter-clockwise.
 
 import { madeOtherwise } from './design.js';
+import { t } from './texts.js';
 
 const RAD = Math.PI / 180;
 
 export const CONTACTS = [
-  { key: 'wave_generator', name: 'Wave generator', index: 'H' },
-  { key: 'ring', name: 'Ring', index: 'K' },
-  { key: 'carrier', name: 'Carrier', index: 'S' },
+  { key: 'wave_generator', name: t('part.wave_generator'), index: 'H' },
+  { key: 'ring', name: t('part.ring'), index: 'K' },
+  { key: 'carrier', name: t('part.carrier'), index: 'S' },
 ];
 
 /** The columns of a sweep's states, apart from angle and tooth number. */

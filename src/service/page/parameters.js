@@ -1,6 +1,8 @@
 // The numbers of a design that a study can vary, with the words that the form has for them.
 
-import { GROUPS, at, changed, fieldsOf, fullLabel, lobesOf } from './design.js';
+import { at, changed, lobesOf } from './design.js';
+import { fieldsOf, fullLabel } from './field.js';
+import { GROUPS } from './fields.js';
 
 /** What changes the drawing of a profile or the sampling of a sweep is no parameter of the drive. */
 const NO_PARAMETERS = ['/sweep', '/profile', '/accuracy', '/assembly'];

@@ -1,13 +1,14 @@
 // One tooth's pass through the meshing zone, from where it enters to the root, put together from the samples of one period
 // as the paper does it (its figures 8 to 10): each loaded tooth stands for a part of the pass.
 
+import { t } from './texts.js';
 import { CONTACTS, LOADS, between, enteringBetween, framesOf, lobesOf, rubbingScale } from './motion.js';
 
 export const ABSCISSAE = [
-  { key: 'input', label: 'Input angle', axis: 'input angle since the valley, Δj, deg', unit: 'deg', symbol: 'Δj' },
-  { key: 'ring', label: 'Ring flank', axis: 'φ_K on the ring, from the tooth tip, deg', unit: 'deg', symbol: 'φ_K' },
-  { key: 'cam', label: 'Cam', axis: 'φ_H on the cam, from the valley, deg', unit: 'deg', symbol: 'φ_H' },
-  { key: 'slot', label: 'Slot', axis: 'distance of the tooth’s centre from the axis, mm', unit: 'mm', symbol: 'ρ' },
+  { key: 'input', label: t('abscissa.input'), axis: t('abscissa.input_axis'), unit: 'deg', symbol: 'Δj' },
+  { key: 'ring', label: t('abscissa.ring'), axis: t('abscissa.ring_axis'), unit: 'deg', symbol: 'φ_K' },
+  { key: 'cam', label: t('abscissa.cam'), axis: t('abscissa.cam_axis'), unit: 'deg', symbol: 'φ_H' },
+  { key: 'slot', label: t('abscissa.slot'), axis: t('abscissa.slot_axis'), unit: 'mm', symbol: 'ρ' },
 ];
 
 /** Positions closer than this are one and the same, on both sides of a jump. */
@@ -21,30 +22,27 @@ const isSamePlace = (one, other) => one.breaksAfter === other.breaksAfter && Mat
 /** The largest of each load of two teeth at one place. */
 const largestOf = (one, other) => ({ ...one, ...Object.fromEntries(LOADS.map((column) => [column, Math.max(one[column], other[column])])) });
 
-/** `{ x: { abscissa: [] }, force: { contact: [] }, stress: { contact: [] }, rubbing: { contact: [] }, position: [], breaks: Set of indices }`,
- *  `rubbing` being pressure times velocity where `rubs` says that it is known; where items deviate each load is the largest of
- *  all teeth that come by, and `isLargest` says so; a break at an
- *  index stands between that point and the one before it. */
-export function passOf(design, sweep) {
+/** The states of a sweep from the entry to the root: `{ row, breaksAfter, step }`, whether the loads jump behind one, and how far a tooth goes to
+ *  the next frame. */
+function statesOnTheWay(sweep, rate, isLargest) {
   const frames = framesOf(sweep.states);
-  const rate = design.drive.teeth.count / design.drive.ring.teeth;
   const all = [];
-  // Where items deviate each tooth has a course of its own.
-  const isLargest = sweep.sweep_period_deg !== undefined;
   // The last sample repeats the first, teeth renumbered.
   for (let index = 0; index < frames.length - 1; index += 1) {
     const { angle, rows } = frames[index];
-    // How far a tooth goes to the next frame.
     const step = (frames[index + 1].angle - angle) / rate;
     const breaksAfter = !isLargest && enteringBetween(sweep, frames[index], frames[index + 1]) !== undefined;
     for (const row of rows.values()) all.push({ row, breaksAfter, step });
   }
   // Where an angle stands twice, what was before the jump comes first.
-  all.sort((one, other) => {
+  return all.sort((one, other) => {
     const ahead = other.row.position_deg - one.row.position_deg;
     return Math.abs(ahead) > SAME_DEG ? ahead : other.breaksAfter - one.breaksAfter;
   });
-  // Where zones are unlike, teeth on several lobes come by the same place, and carry there the same; where items deviate, each another load.
+}
+
+/** Where zones are unlike, teeth on several lobes come by the same place, and carry there the same; where items deviate, each another load. */
+function placesOf(all, isLargest) {
   const stretch = isLargest ? (all[0].row.position_deg - all.at(-1).row.position_deg) / MOST_STRETCHES : 0;
   const points = [];
   all.forEach((point, index) => {
@@ -53,8 +51,34 @@ export function passOf(design, sweep) {
     if (!isSame) points.push({ ...point });
     else if (isLargest) last.row = largestOf(last.row, point.row);
   });
+  return points;
+}
+
+/** Indices before which the loads jump. */
+function breaksOf(points) {
+  const breaks = new Set();
+  points.forEach(({ row, breaksAfter, step }, index) => {
+    const next = points[index + 1];
+    if (!breaksAfter || !next) return;
+    // A tooth on another lobe may come by between two frames of this one, and still before the jump.
+    const isBetween = row.position_deg - next.row.position_deg < step - SAME_DEG;
+    if (!(isBetween && next.breaksAfter)) breaks.add(index + 1);
+  });
+  return breaks;
+}
+
+/** `{ x: { abscissa: [] }, force: { contact: [] }, stress: { contact: [] }, rubbing: { contact: [] }, position: [], breaks: Set of indices }`,
+ *  `rubbing` being pressure times velocity where `rubs` says that it is known; where items deviate each load is the largest of
+ *  all teeth that come by, and `isLargest` says so; a break at an
+ *  index stands between that point and the one before it. */
+export function passOf(design, sweep) {
+  const rate = design.drive.teeth.count / design.drive.ring.teeth;
+  // Where items deviate each tooth has a course of its own.
+  const isLargest = sweep.sweep_period_deg !== undefined;
+  const points = placesOf(statesOnTheWay(sweep, rate, isLargest), isLargest);
   const column = (name) => points.map(({ row }) => row[name]);
   const position = column('position_deg');
+  const scale = rubbingScale(design, sweep);
   const pass = {
     position,
     // Ascending, as the columns of x are.
@@ -68,13 +92,12 @@ export function passOf(design, sweep) {
     force: {},
     stress: {},
     rubbing: {},
+    rubs: scale !== undefined,
     isLargest,
     entersUnderLoad: sweep.enters_under_load,
-    breaks: new Set(),
+    breaks: breaksOf(points),
     peaks: {},
   };
-  const scale = rubbingScale(design, sweep);
-  pass.rubs = scale !== undefined;
   // The peak of a duty may be another point's.
   const rubbingPeaks = sweep.duty ? undefined : sweep.losses?.pressure_velocity_mpa_m_per_s;
   for (const { key } of CONTACTS) {
@@ -83,13 +106,6 @@ export function passOf(design, sweep) {
     pass.rubbing[key] = column(`rubbing_${key}`).map((rubbing) => rubbing * (scale ?? 0));
     pass.peaks[key] = { ...sweep.peaks[key], rubbing: rubbingPeaks?.[key] };
   }
-  points.forEach(({ row, breaksAfter, step }, index) => {
-    const next = points[index + 1];
-    if (!breaksAfter || !next) return;
-    // A tooth on another lobe may come by between two frames of this one, and still before the jump.
-    const isBetween = row.position_deg - next.row.position_deg < step - SAME_DEG;
-    if (!(isBetween && next.breaksAfter)) pass.breaks.add(index + 1);
-  });
   return pass;
 }
 

@@ -6,12 +6,13 @@ import { html, oncePerFrame, setAttributes, setProperties, setText, svg } from '
 import { difference, fixed, number } from './format.js';
 import { CONTACTS } from './motion.js';
 import { ABSCISSAE, abscissaAt, readAt } from './pass.js';
+import { labelled, t } from './texts.js';
 
 const QUANTITIES = [
-  { key: 'force', title: 'Normal force', unit: 'N', symbol: 'F', peak: 'force_n' },
-  { key: 'stress', title: 'Contact stress', unit: 'MPa', symbol: 'σ', peak: 'stress_mpa' },
+  { key: 'force', title: t('plot.force'), unit: 'N', symbol: 'F', peak: 'force_n' },
+  { key: 'stress', title: t('plot.stress'), unit: 'MPa', symbol: 'σ', peak: 'stress_mpa' },
   // Shown where there is friction and a speed.
-  { key: 'rubbing', title: 'Pressure times velocity', unit: 'MPa m/s', symbol: 'p·v', peak: 'rubbing', isKnown: (pass) => pass?.rubs === true },
+  { key: 'rubbing', title: t('plot.rubbing'), unit: 'MPa m/s', symbol: 'p·v', peak: 'rubbing', isKnown: (pass) => pass?.rubs === true },
 ];
 
 /** Room on either side of the pass, so that its first jump does not fall on the axis, and above the largest peak for its number. */
@@ -34,7 +35,7 @@ class Plot {
     const { pass, abscissa } = owner;
     const isKnown = (candidate) => candidate && (quantity.isKnown?.(candidate) ?? true);
     setProperties(this.figure, { hidden: quantity.isKnown !== undefined && !isKnown(pass) });
-    setText(this.figure.querySelector('figcaption'), `${quantity.title}, ${quantity.unit}${pass?.isLargest ? ', the largest of all teeth' : ''}`);
+    setText(this.figure.querySelector('figcaption'), pass?.isLargest ? t('plot.headed_largest', quantity) : t('plot.headed', quantity));
     this.frame = undefined;
     const passes = [owner.reference, pass].filter(isKnown);
     if (!isKnown(pass) || container.clientWidth === 0) {
@@ -159,8 +160,8 @@ export class Plots {
   constructor({ abscissae, contacts, charts, readout }, onScrub) {
     this.scrubbed = onScrub;
     this.plots = QUANTITIES.map((quantity) => {
-      const container = html('div', { class: 'chart', role: 'img', 'aria-label': `${quantity.title} over a tooth’s pass; the table of loaded teeth has the numbers` });
-      const figure = html('figure', { hidden: quantity.isKnown !== undefined }, html('figcaption', {}, `${quantity.title}, ${quantity.unit}`), container);
+      const container = html('div', { class: 'chart', role: 'img', 'aria-label': t('plot.label', quantity) });
+      const figure = html('figure', { hidden: quantity.isKnown !== undefined }, html('figcaption', {}, t('plot.headed', quantity)), container);
       charts.append(figure);
       return new Plot(quantity, figure, container, this);
     });
@@ -208,7 +209,7 @@ export class Plots {
         this.#reading.set(`${key} ${contact.key}`, { value, delta });
         return html('td', {}, value, delta);
       });
-      const row = html('tr', {}, html('th', { scope: 'row' }, `${title}, ${unit}`), cells);
+      const row = html('tr', {}, html('th', { scope: 'row' }, t('plot.headed', { title, unit })), cells);
       this.#readingRows.set(key, row);
       return row;
     });
@@ -261,9 +262,9 @@ export class Plots {
     const reading = hovers ? pass && readAt(pass, abscissa, x) : tooth;
     const other = reference && x !== undefined ? readAt(reference, abscissa, x) : undefined;
     const { symbol, unit } = ABSCISSAE.find(({ key }) => key === abscissa);
-    const who = hovers ? 'At the cursor' : `Tooth ${this.selected}`;
-    const place = x === undefined ? 'carries no load here' : `${symbol} = ${fixed(x, 2)} ${unit}`;
-    setText(this.place, `${who}: ${place}${other ? '; differences are from the reference' : ''}`);
+    const who = hovers ? t('plot.cursor') : t('mechanism.tooth', { tooth: this.selected });
+    const place = x === undefined ? t('plot.no_load') : `${symbol} = ${fixed(x, 2)} ${unit}`;
+    setText(this.place, labelled(who, other ? t('plot.with_differences', { place }) : place));
     for (const { key, isKnown } of QUANTITIES) {
       setProperties(this.#readingRows.get(key), { hidden: isKnown !== undefined && !isKnown(pass) });
       for (const contact of CONTACTS) {

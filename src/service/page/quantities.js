@@ -3,32 +3,12 @@
 import { at } from './design.js';
 import { number, withUnit } from './format.js';
 import { getJson } from './service.js';
-
-/** How names end in units; the longest first. */
-const UNIT_ENDINGS = /_(nm_per_rad|mpa_m_per_s|arcmin|mm|deg|mpa|nm|um|n|w)$/;
-
-const PHRASES = [
-  [/^carrier_finger_share$/, 'finger deflection over contact deflection'],
-  [/^coincidence_degree$/, 'contact ratio'],
-  [/^carrier_radial_space$/, 'height of the carrier'],
-  [/_over_/, ' over '],
-  [/_(min|least)$/, ', least'],
-  [/_(max|largest)$/, ', largest'],
-  [/_mean$/, ', mean'],
-  [/_peak_to_peak$/, ', peak to peak'],
-  [/^(.+)_back_driven$/, '$1, back-driven'],
-  [/^efficiency_(.+)_fixed/, 'efficiency, $1 fixed'],
-  [/^(transmission_ratio)$/, '$1, ring fixed'],
-  [/^(transmission_ratio)_carrier_fixed$/, '$1, carrier fixed'],
-  [/^(peak_force|peak_stress|half_width|loss_ratio|pressure_velocity)_(wave_generator|ring|carrier|bearing)$/, '$1, $2'],
-  [/^(torque_capacity)_(input|output)$/, '$1, $2'],
-  [/^(tooth_center_clearance)_(inner|outer)$/, '$1, $2'],
-];
+import { capital, t, textOf } from './texts.js';
 
 const GROUPS = [
-  { title: 'Geometry', needs: ['drive'] },
-  { title: 'Under load', needs: ['load', 'allowable_stress'] },
-  { title: 'Friction', needs: ['friction', 'friction_and_speed'] },
+  { title: t('quantities.geometry'), needs: ['drive'] },
+  { title: t('quantities.load'), needs: ['load', 'allowable_stress'] },
+  { title: t('quantities.friction'), needs: ['friction', 'friction_and_speed'] },
 ];
 
 /** Of a design, whether it has what a quantity needs. */
@@ -40,11 +20,8 @@ const HAS = {
   friction_and_speed: (design) => at(design, '/friction') !== undefined && (at(design, '/load/input_speed_rpm') ?? at(design, '/load/duty')) !== undefined,
 };
 
-function labelOf({ name }) {
-  const bare = name.replace(UNIT_ENDINGS, '');
-  const phrase = PHRASES.reduce((text, [pattern, words]) => text.replace(pattern, words), bare).replaceAll('_', ' ').replaceAll('center', 'centre');
-  return phrase[0].toUpperCase() + phrase.slice(1);
-}
+/** The name of a quantity in words; one that the page does not know is spelled as it is. */
+const labelOf = ({ name }) => textOf(`quantity.${name}`) ?? capital(name.replaceAll('_', ' '));
 
 /** The quantities in the service's order, each with its `label`. */
 export class Quantities {
@@ -73,7 +50,7 @@ export class Quantities {
 
   /** A value; `scientific` digits where it is written with a power of ten. */
   bare(name, value, significant = 4, scientific = undefined) {
-    return this.get(name).is_flag ? (value ? 'yes' : 'no') : number(value, significant, scientific);
+    return this.get(name).is_flag ? (value ? t('result.yes') : t('result.no')) : number(value, significant, scientific);
   }
 
   /** The same with its unit. */
@@ -86,6 +63,6 @@ export class Quantities {
   /** The label with the unit, as an axis or a column has it. */
   headed(name) {
     const { label, unit } = this.get(name);
-    return unit ? `${label}, ${unit}` : label;
+    return unit ? t('plot.headed', { title: label, unit }) : label;
   }
 }

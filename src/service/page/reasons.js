@@ -1,6 +1,7 @@
 // Why a search found what it found: which limits variants fell to, which bind, and what would have to give where nothing is possible.
 
 import { number } from './format.js';
+import { small, t } from './texts.js';
 
 /** Within this share of a limit a drive is close to it. */
 const CLOSE = 0.01;
@@ -39,7 +40,7 @@ export function bestOf(drives, goals) {
 
 /** Names the drives, says of each which limits it is close to, and of each limit how many drives are close to it. */
 export function held(drives, limits) {
-  const front = drives.map((found, index) => ({ ...found, name: `Drive ${index + 1}`, heldBy: limits.filter((limit) => isClose(limit, found.quantities[limit.quantity])) }));
+  const front = drives.map((found, index) => ({ ...found, name: t('limits.drive', { number: index + 1 }), heldBy: limits.filter((limit) => isClose(limit, found.quantities[limit.quantity])) }));
   return { front, limits: limits.map((limit) => ({ ...limit, binds: front.filter(({ heldBy }) => heldBy.includes(limit)).length })).filter(({ fell, binds }) => fell > 0 || binds > 0) };
 }
 
@@ -95,11 +96,10 @@ export function apart(quantities, name, value, limit) {
 export function limitInWords({ quantity, bound, limit }, quantities, { isWithin = false } = {}) {
   const { label: name } = quantities.get(quantity);
   const label = isWithin ? small(name) : name;
-  if (bound === 'is') return `${label}: ${limit ? 'yes' : 'no'}`;
-  return `${label} at ${bound === 'max' ? 'most' : 'least'} ${quantities.shown(quantity, limit)}`;
+  if (bound === 'is') return limit ? t('limits.is', { label }) : t('limits.is_not', { label });
+  const value = quantities.shown(quantity, limit);
+  return bound === 'max' ? t('limits.at_most', { label, value }) : t('limits.at_least', { label, value });
 }
-
-export const small = (text) => text[0].toLowerCase() + text.slice(1);
 
 /** A number that a limit can be set to so that what needs it fits: rounded to the far side. */
 export function roomFor({ bound, needed }) {
@@ -109,4 +109,4 @@ export function roomFor({ bound, needed }) {
 }
 
 /** A count, and its share of all. */
-export const counted = (count, all) => `${number(count, 9)}${all > 0 ? ` (${number((100 * count) / all, 2)}\u202f%)` : ''}`;
+export const shareOf = (count, all) => `${number(count, 9)}${all > 0 ? ` (${number((100 * count) / all, 2)}\u202f%)` : ''}`;

@@ -2,20 +2,21 @@
 
 import { at, changed, withVirtualWork } from './design.js';
 import { number, withUnit } from './format.js';
+import { t } from './texts.js';
 
 /** Rounded to hundredths on the safe side of a limit, and off the limit itself. */
 const below = (limit) => Number((Math.ceil(100 * limit - 1e-9) / 100 - 0.01).toFixed(2));
 const above = (limit, step) => step * Math.ceil(limit / step);
 
-const set = (pointer, value, unit) => ({ label: `Set to ${withUnit(number(value, 6), unit)}`, change: (design) => changed(design, pointer, value) });
-const unbored = { label: 'Remove the bore', change: (design) => changed(design, '/drive/ring/tip_radius_mm', undefined) };
-const virtualWork = { label: 'Use virtual work', change: withVirtualWork };
-const johnson = { label: 'Use Johnson’s law', change: (design) => changed(withVirtualWork(design), '/model/stiffness', { law: 'johnson' }) };
+const set = (pointer, value, unit) => ({ label: t('form.set_to', { value: withUnit(number(value, 6), unit) }), change: (design) => changed(design, pointer, value) });
+const unbored = { label: t('remedy.unbored'), change: (design) => changed(design, '/drive/ring/tip_radius_mm', undefined) };
+const virtualWork = { label: t('remedy.virtual_work'), change: withVirtualWork };
+const johnson = { label: t('remedy.johnson'), change: (design) => changed(withVirtualWork(design), '/model/stiffness', { law: 'johnson' }) };
 
 /** The share of a part behind the contacts that it is estimated to yield, as series compliance. */
 const backing = (contact, ...backings) => (_, { sweep }) => {
   const found = sweep?.series_compliance_estimates?.find((estimate) => backings.includes(estimate.backing));
-  return found && { label: 'Use the estimated compliance', change: (design) => changed(withVirtualWork(design), `/model/series_compliance_mm_per_n/${contact}`, Number(found.compliance_mm_per_n.toPrecision(3))) };
+  return found && { label: t('remedy.compliance'), change: (design) => changed(withVirtualWork(design), `/model/series_compliance_mm_per_n/${contact}`, Number(found.compliance_mm_per_n.toPrecision(3))) };
 };
 
 /** The torque at which the first contact reaches its allowable stress, at the shaft where the design gives it. */
@@ -32,7 +33,7 @@ const REMEDIES = {
   undercut: ({ limit }) => set('/drive/teeth/radius_mm', below(limit), 'mm'),
   bore_shortens_flank: () => unbored,
   bore_without_effect: () => unbored,
-  few_teeth_in_mesh: (_, __, design) => at(design, '/drive/teeth/installed') < at(design, '/drive/teeth/count') && { label: 'Install a tooth in every slot', change: (now) => changed(now, '/drive/teeth/installed', undefined) },
+  few_teeth_in_mesh: (_, __, design) => at(design, '/drive/teeth/installed') < at(design, '/drive/teeth/count') && { label: t('remedy.every_slot'), change: (now) => changed(now, '/drive/teeth/installed', undefined) },
   hollow_wave_generator: ({ limit }) => set('/drive/wave_generator/amplitude_mm', below(limit), 'mm'),
   flat_cuts_the_contact: ({ limit }) => set('/drive/teeth/flat_length_mm', below(limit), 'mm'),
   linear_law_too_stiff: () => johnson,

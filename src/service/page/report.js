@@ -1,11 +1,15 @@
 // What only paper shows: the design as a table, with its name, date and address, and the findings as another. The rest of the
 // report is the page itself.
 
-import { GROUPS, at, fieldsOf, fullLabel, isOn, kindOf } from './design.js';
+import { at } from './design.js';
+import { fieldsOf, fullLabel, isOn, kindOf } from './field.js';
+import { GROUPS } from './fields.js';
 import { html } from './dom.js';
-import { basisOf, contactOf, kindOf as kindOfFinding, meaningOf, readable, sentence } from './findings.js';
+import { contactOf, kindOf as kindOfFinding, meaningOf, sourceOf } from './findings.js';
 import { DASH, number, withUnit } from './format.js';
 import { linesOf } from './lines.js';
+import { labelled, listed, t } from './texts.js';
+import { sentence } from './words.js';
 
 function shownValue(field, design) {
   const value = at(design, field.pointer);
@@ -17,11 +21,11 @@ function shownValue(field, design) {
     // What is left to the service is no input.
     return chosen === '' ? undefined : labelled(chosen);
   }
-  if (field.kind === 'flag') return isOn(field, design) ? 'yes' : undefined;
+  if (field.kind === 'flag') return isOn(field, design) ? t('result.yes') : undefined;
   if (field.kind === 'oneOf' || field.derived) return undefined;
-  if (field.kind === 'lines') return value && linesOf(field, value).map((line) => line.split('  ').map((number, index) => withUnit(number, field.columns[index].unit)).join(', ')).join('; ');
+  if (field.kind === 'lines') return value && linesOf(field, value).map((line) => listed(line.split('  ').map((number, index) => withUnit(number, field.columns[index].unit)))).join(t('list.semicolon'));
   // One for each contact, which the form has no fields for.
-  if (value !== null && typeof value === 'object') return Object.entries(value).map(([contact, each]) => `${contact.replaceAll('_', ' ')} ${withUnit(String(each), field.unit)}`).join(', ');
+  if (value !== null && typeof value === 'object') return listed(Object.entries(value).map(([contact, each]) => `${t(`part.${contact}`).toLowerCase()} ${withUnit(String(each), field.unit)}`));
   const shown = value ?? field.preset;
   return typeof shown === 'number' ? withUnit(String(shown), field.unit) : undefined;
 }
@@ -29,21 +33,16 @@ function shownValue(field, design) {
 /** Of fields of kinds and alternatives, only what a document gives: their presets are for when they are chosen. */
 const optional = (group) => new Set((group.parts ?? [group]).flatMap(({ fields }) => fields).flatMap((field) => field.options ?? []).flatMap((option) => option.fields ?? option.field ?? []));
 
-const LISTS = {
-  tooth_radius_um: ['Teeth thinner in radius, each', 'µm'],
-  slot_angle_arcsec: ['Slots turned, each', '″'],
-  slot_wall_um: ['Slot walls set back, each', 'µm'],
-  ring_space_um: ['Ring’s spaces set back, each', 'µm'],
-  ring_space_angle_arcsec: ['Ring’s spaces turned, each', '″'],
-  wave_generator_lobe_um: ['Lobes set back, each', 'µm'],
-};
+/** Units of the deviations of single items. */
+const LISTS = { tooth_radius_um: 'µm', slot_angle_arcsec: '″', slot_wall_um: 'µm', ring_space_um: 'µm', ring_space_angle_arcsec: '″', wave_generator_lobe_um: 'µm' };
 
 /** What single items deviate by: how many there are, from the least to the largest. */
 function shownList(name, design) {
   const values = at(design, `/deviations/${name}`);
   if (!Array.isArray(values) || values.length === 0) return undefined;
   const [least, most] = [Math.min(...values), Math.max(...values)];
-  return `${values.length}, ${least === most ? '' : `${number(least)} to `}${withUnit(number(most), LISTS[name][1])}`;
+  const range = { count: values.length, least: number(least), most: withUnit(number(most), LISTS[name]) };
+  return least === most ? t('report.list_of_one', range) : t('report.list', range);
 }
 
 /** The inputs in which two designs differ: `[{ pointer, label, value, reference }]`, in words; what is left out is `–`. */
@@ -56,10 +55,10 @@ export function inputDifferences(design, reference) {
       if (value !== other) found.push({ pointer: field.pointer, label: fullLabel(field), value: value ?? DASH, reference: other ?? DASH });
     }
   }
-  for (const [name, [label]] of Object.entries(LISTS)) {
+  for (const name of Object.keys(LISTS)) {
     const [one, other] = [design, reference].map((each) => at(each, `/deviations/${name}`));
     if (JSON.stringify(one ?? []) === JSON.stringify(other ?? [])) continue;
-    found.push({ pointer: `/deviations/${name}`, label, value: shownList(name, design) ?? DASH, reference: shownList(name, reference) ?? DASH });
+    found.push({ pointer: `/deviations/${name}`, label: t(`label./deviations/${name}`), value: shownList(name, design) ?? DASH, reference: shownList(name, reference) ?? DASH });
   }
   return found;
 }
@@ -71,13 +70,13 @@ export function reportOf(name, { design, version, reference, reasons }, address)
     const rows = fieldsOf(group)
       .filter((field) => !onlyGiven.has(field) || at(design, field.pointer) !== undefined)
       .map((field) => [field.label, shownValue(field, design)])
-      .concat(group.pointer === '/deviations' ? Object.entries(LISTS).map(([name, [label]]) => [label, shownList(name, design)]) : [])
+      .concat(group.pointer === '/deviations' ? Object.keys(LISTS).map((name) => [t(`label./deviations/${name}`), shownList(name, design)]) : [])
       .filter(([, value]) => value !== undefined)
       .map(([label, value]) => html('tr', {}, html('th', {}, label), html('td', {}, value)));
     return rows.length ? html('table', {}, html('caption', {}, group.title), html('tbody', {}, rows)) : undefined;
   });
   const materials = GROUPS.find((group) => group.pointer === '/materials');
-  const parts = materials.parts.map(({ title, fields }) =>
+  const materialRows = materials.parts.map(({ title, fields }) =>
     html('tr', {}, html('th', {}, title), html('td', {}, fields.map((field) => shownValue(field, design)).join(', ν '))),
   );
   // Few designs give them, but then up to eight: lines across the page take less of it than a table.
@@ -85,20 +84,20 @@ export function reportOf(name, { design, version, reference, reasons }, address)
   const given = made.parts
     .map(({ title, fields }) => [title, fields.filter((field) => shownValue(field, design)).map((field) => `${field.label.toLowerCase()} ${shownValue(field, design)}`)])
     .filter(([, values]) => values.length > 0)
-    .map(([title, values]) => `${title}: ${values.join(', ')}`);
+    .map(([title, values]) => labelled(title, listed(values)));
   return [
     html('h1', {}, name),
     html(
       'p',
       { class: 'imprint' },
-      `${version ? 'Calculated' : 'Printed'} ${new Date().toISOString().slice(0, 10)} by toothwave ${version ?? ''}`,
-      reference && version ? `; compared with the reference ${reference.name}` : '',
+      version ? t('report.calculated', { date: new Date().toISOString().slice(0, 10), version }) : t('report.printed', { date: new Date().toISOString().slice(0, 10) }),
+      reference && version ? t('report.compared', { name: reference.name }) : '',
       ' · ',
-      html('a', { href: address }, 'this design on line'),
+      html('a', { href: address }, t('report.on_line')),
     ),
-    reasons.length > 0 && html('div', { class: 'report-reasons' }, html('h2', {}, `${reasons[0].title}.`), html('ul', {}, reasons.map(({ label, detail }) => html('li', {}, label ? `${label}: ${detail}` : detail)))),
-    html('div', { class: 'report-design' }, groups.filter(Boolean), html('table', {}, html('caption', {}, materials.title), html('tbody', {}, parts))),
-    given.length > 0 ? html('p', { class: 'report-parts' }, html('b', {}, `${made.title}. `), `${given.join('. ')}.`) : '',
+    reasons.length > 0 && html('div', { class: 'report-reasons' }, html('h2', {}, sentence(reasons[0].title)), html('ul', {}, reasons.map(({ label, detail }) => html('li', {}, label ? labelled(label, detail) : detail)))),
+    html('div', { class: 'report-design' }, groups.filter(Boolean), html('table', {}, html('caption', {}, materials.title), html('tbody', {}, materialRows))),
+    given.length > 0 ? html('p', { class: 'report-parts' }, html('b', {}, `${sentence(made.title)} `), given.map(sentence).join(' ')) : '',
   ].filter(Boolean);
 }
 
@@ -107,7 +106,7 @@ export function reportOf(name, { design, version, reference, reasons }, address)
 export function findingsTable(findings) {
   const kinds = new Map();
   for (const finding of findings) kinds.set(finding.code, [...(kinds.get(finding.code) ?? []), finding]);
-  const head = ['Finding', 'Here', 'Limit', 'What to change'].map((text) => html('th', { scope: 'col' }, text));
+  const head = [t('report.finding'), t('report.here'), t('report.limit'), t('explanation.change')].map((text) => html('th', { scope: 'col' }, text));
   const bodies = [...kinds.values()].map((kind) => {
     const [first] = kind;
     const rows = kind.map((finding) => {
@@ -118,8 +117,8 @@ export function findingsTable(findings) {
         {},
         finding === first && html('th', { scope: 'rowgroup', rowspan: kind.length }, kindOfFinding(first)),
         html('td', {}, where && `${where} `, html('b', { class: 'number' }, withUnit(number(value, 5), unit))),
-        html('td', {}, html('span', { class: 'number' }, withUnit(number(limit, 5), unit)), finding === first && html('span', { class: 'basis' }, basisOf(first))),
-        finding === first && html('td', { rowspan: kind.length }, sentence(readable(first.advice))),
+        html('td', {}, html('span', { class: 'number' }, withUnit(number(limit, 5), unit)), finding === first && html('span', { class: 'basis' }, sourceOf(first))),
+        finding === first && html('td', { rowspan: kind.length }, sentence(first.advice)),
       );
     });
     const meaning = html('tr', { class: 'meaning' }, html('td', { colspan: 4 }, [...new Set(kind.map(meaningOf))].join(' ')));

@@ -2,13 +2,16 @@
 // are free in each.
 
 import { at } from './design.js';
+import * as field from './field.js';
+import { number as digits } from './format.js';
 import { CONTACTS } from './motion.js';
 import { standardRadiiMm } from './rounding.js';
+import { counted, t } from './texts.js';
 
 export const ROOT = '/find';
 
-const number = (name, label, symbol, unit, more) => ({ kind: 'number', pointer: `${ROOT}/${name}`, label, symbol, unit, ...more });
-const flag = (name, label) => ({ kind: 'flag', pointer: `${ROOT}/${name}`, label });
+const number = (name, symbol, unit, more) => field.number(`${ROOT}/${name}`, symbol, unit, more);
+const flag = (name) => field.flag(`${ROOT}/${name}`);
 
 const asked = (requirements, name) => at(requirements, `${ROOT}/${name}`);
 
@@ -35,22 +38,18 @@ const lobesAsked = (requirements) => asked(requirements, 'lobes') ?? 3;
 const WAVE_GENERATORS = [
   {
     name: 'harmonic_two',
-    label: 'two lobes, harmonic path of the teeth',
     of: () => ({ lobes: 2, fixed: { kind: 'harmonic_path', lobes: 2 }, free: (root, tooth) => ({ mean_path_radius_mm: [0.12 * root, root], amplitude_mm: [0.02 * tooth, tooth] }) }),
   },
   {
     name: 'ellipse',
-    label: 'two lobes, ellipse',
     of: () => ({ lobes: 2, fixed: { kind: 'ellipse' }, free: (root) => ({ semi_major_mm: [0.12 * root, root], semi_minor_mm: [0.12 * root, root] }) }),
   },
   {
     name: 'eccentric',
-    label: 'one lobe, eccentric circle',
     of: () => ({ lobes: 1, fixed: { kind: 'eccentric' }, free: (root, tooth) => ({ radius_mm: [0.12 * root, root], eccentricity_mm: [0.02 * tooth, tooth] }) }),
   },
   {
     name: 'harmonic_more',
-    label: 'more lobes, harmonic path',
     of: (requirements) => ({
       lobes: lobesAsked(requirements),
       fixed: { kind: 'harmonic_path', lobes: lobesAsked(requirements) },
@@ -62,19 +61,19 @@ const WAVE_GENERATORS = [
 const JOHNSON = { compatibility: 'virtual_work', stiffness: { law: 'johnson' } };
 
 const SHAPES = [
-  { name: 'cylinder', label: 'cylinders', model: JOHNSON, free: (tooth, width) => ({ width_mm: [0.08 * width, width] }) },
-  { name: 'flat_sided', label: 'cylinders with flats', model: JOHNSON, free: (tooth, width) => ({ width_mm: [0.08 * width, width], flat_length_mm: [0.05 * tooth, 1.2 * tooth] }) },
-  { name: 'ball', label: 'balls, without grooves', model: { compatibility: 'virtual_work', stiffness: { law: 'hertz' } }, free: () => ({}) },
+  { name: 'cylinder', model: JOHNSON, free: (tooth, width) => ({ width_mm: [0.08 * width, width] }) },
+  { name: 'flat_sided', model: JOHNSON, free: (tooth, width) => ({ width_mm: [0.08 * width, width], flat_length_mm: [0.05 * tooth, 1.2 * tooth] }) },
+  { name: 'ball', model: { compatibility: 'virtual_work', stiffness: { law: 'hertz' } }, free: () => ({}) },
 ];
 
 /** What can count, with the quantity that says so. */
 const GOALS = [
-  { name: 'small', label: 'small outer diameter', quantity: 'outer_diameter_mm', goal: 'min' },
-  { name: 'strong', label: 'high torque capacity', quantity: 'torque_capacity_output_nm', goal: 'max' },
-  { name: 'narrow', label: 'narrow teeth', quantity: 'tooth_width_mm', goal: 'min' },
-  { name: 'stiff', label: 'high torsional stiffness', quantity: 'torsional_stiffness_min_nm_per_rad', goal: 'max' },
-  { name: 'even', label: 'small transmission error', quantity: 'transmission_error_peak_to_peak_deg', goal: 'min' },
-  { name: 'efficient', label: 'high efficiency', quantity: 'efficiency_ring_fixed', goal: 'max' },
+  { name: 'small', quantity: 'outer_diameter_mm', goal: 'min' },
+  { name: 'strong', quantity: 'torque_capacity_output_nm', goal: 'max' },
+  { name: 'narrow', quantity: 'tooth_width_mm', goal: 'min' },
+  { name: 'stiff', quantity: 'torsional_stiffness_min_nm_per_rad', goal: 'max' },
+  { name: 'even', quantity: 'transmission_error_peak_to_peak_deg', goal: 'min' },
+  { name: 'efficient', quantity: 'efficiency_ring_fixed', goal: 'max' },
 ];
 const MOST_GOALS = 4;
 
@@ -100,76 +99,65 @@ export const FIRST = {
 
 export const GROUPS = [
   {
-    title: 'Motion and load',
-    pointer: `${ROOT}/load`,
+    ...field.group(`${ROOT}/load`),
     open: true,
     fields: [
-      number('ratio', 'Ratio, ring fixed', 'i_HG', '', { whole: true, likely: 20 }),
-      number('ratio_max', 'Ratio, up to', '', '', { whole: true, optional: () => 'just that' }),
-      number('output_torque_nm', 'Output torque', 'M_G', 'N·m', { likely: 200 }),
-      number('input_speed_rpm', 'Input speed', 'n', '1/min', { optional: () => 'not asked', step: 100 }),
+      number('ratio', 'i_HG', '', { whole: true, likely: 20 }),
+      number('ratio_max', '', '', { whole: true, optional: () => t('empty.one_ratio') }),
+      number('output_torque_nm', 'M_G', 'N·m', { likely: 200 }),
+      number('input_speed_rpm', 'n', '1/min', { optional: () => t('empty.not_asked'), step: 100 }),
     ],
   },
   {
-    title: 'Space',
-    pointer: `${ROOT}/space`,
+    ...field.group(`${ROOT}/space`),
     open: true,
     fields: [
-      number('outer_diameter_mm', 'Greatest outer diameter', '', 'mm', { likely: 120, step: 1 }),
-      number('width_mm', 'Greatest width of the teeth', '', 'mm', { likely: 30, step: 1 }),
+      number('outer_diameter_mm', '', 'mm', { likely: 120, step: 1 }),
+      number('width_mm', '', 'mm', { likely: 30, step: 1 }),
     ],
   },
   {
-    title: 'Strength',
-    pointer: `${ROOT}/bears`,
+    ...field.group(`${ROOT}/bears`),
     open: true,
-    hint: 'A Hertz stress, without a factor of safety: bearing steel and case-hardened steel bear 1500 MPa (ISO 281, ISO 6336-5), alloy steel of 300 HV some 770.',
     fields: [
-      number('allowable_stress_mpa', 'Allowable contact stress', 'σ', 'MPa', { likely: 1500, step: 50 }),
-      ...CONTACTS.map(({ key, name }) => number(`allowable_${key}_mpa`, `Lower at the ${name.toLowerCase()}`, '', 'MPa', { optional: () => 'no lower', step: 50 })),
+      number('allowable_stress_mpa', 'σ', 'MPa', { likely: 1500, step: 50 }),
+      ...CONTACTS.map(({ key }) => number(`allowable_${key}_mpa`, '', 'MPa', { optional: () => t('empty.no_lower'), step: 50 })),
     ],
   },
   {
-    title: 'Buildable',
-    pointer: `${ROOT}/build`,
+    ...field.group(`${ROOT}/build`),
     open: true,
-    hint: 'Teeth never touch each other, stay inside the carrier and meet flanks that are not too steep. The finger deflection is estimated for cylinders, held at both ends.',
     fields: [
-      flag('undercut', 'Undercut ring tips are allowed'),
-      number('wall', 'Wall between slots, over their width', '', '', { optional: () => 'not asked', step: 0.05 }),
-      number('carrier_space_mm', 'Height of the carrier between wave generator and ring', '', 'mm', { optional: () => 'not asked', step: 0.5 }),
-      number('fingers', 'Greatest finger deflection over contact deflection', '', '', { optional: () => 'not asked', step: 0.05 }),
-      number('efficiency', 'Least efficiency', 'η', '', { optional: () => 'not asked', step: 0.01 }),
-      number('friction', 'Coefficient of friction', 'μ', '', { likely: 0.05, step: 0.01 }),
-      flag('rounded', 'Round lengths to 0.01 mm'),
-      flag('standard', 'Standard diameters of rollers and balls'),
+      flag('undercut'),
+      number('wall', '', '', { optional: () => t('empty.not_asked'), step: 0.05 }),
+      number('carrier_space_mm', '', 'mm', { optional: () => t('empty.not_asked'), step: 0.5 }),
+      number('fingers', '', '', { optional: () => t('empty.not_asked'), step: 0.05 }),
+      number('efficiency', 'η', '', { optional: () => t('empty.not_asked'), step: 0.01 }),
+      number('friction', 'μ', '', { likely: 0.05, step: 0.01 }),
+      flag('rounded'),
+      flag('standard'),
     ],
   },
   {
-    title: 'Kinds',
-    pointer: `${ROOT}/kinds`,
+    ...field.group(`${ROOT}/kinds`),
     open: true,
     parts: [
       {
-        title: 'Wave generator',
-        fields: [...WAVE_GENERATORS.map(({ name, label }) => flag(`wave_generators/${name}`, label)), number('lobes', 'More lobes', 'U', '', { whole: true, optional: () => '3' })],
+        title: t('part.wave_generator'),
+        fields: [...WAVE_GENERATORS.map(({ name }) => flag(`wave_generators/${name}`)), number('lobes', 'U', '', { whole: true, optional: () => '3' })],
       },
-      { title: 'Teeth', fields: SHAPES.map(({ name, label }) => flag(`shapes/${name}`, label)) },
+      { title: t('part.teeth'), fields: SHAPES.map(({ name }) => flag(`shapes/${name}`)) },
     ],
   },
   {
-    title: 'Goals',
-    pointer: `${ROOT}/goals`,
+    ...field.group(`${ROOT}/goals`),
     open: true,
-    hint: 'One to four. With several there is no single best drive, but those that none beats in everything.',
     fields: [
-      ...GOALS.map(({ name, label }) => flag(`goals/${name}`, label)),
-      {
-        kind: 'choice',
-        pointer: `${ROOT}/effort`,
-        label: 'Effort, for each kind',
-        options: Object.entries(EVALUATIONS).map(([value, count]) => ({ value, label: `${value}: ${count / 1000}\u202f000 variants` })),
-      },
+      ...GOALS.map(({ name }) => flag(`goals/${name}`)),
+      field.choice(
+        `${ROOT}/effort`,
+        Object.entries(EVALUATIONS).map(([value, count]) => ({ value, label: t(`option.${ROOT}/effort.${value}`, { count: digits(count, 9) }) })),
+      ),
     ],
   },
 ];
@@ -225,18 +213,18 @@ export function faultsOf(requirements) {
   const faults = [];
   const fault = (name, detail) => faults.push({ pointer: `${ROOT}/${name}`, code: 'out_of_range', detail });
   const [least, most] = ratiosOf(requirements);
-  if (least < 2) fault('ratio', 'a ratio is 2 or more');
-  else if (most < least) fault('ratio_max', `the range is empty: it ends below ${least}`);
+  if (least < 2) fault('ratio', t('requirement.ratio'));
+  else if (most < least) fault('ratio_max', t('requirement.empty_range', { least }));
   for (const name of ['output_torque_nm', 'outer_diameter_mm', 'width_mm', 'allowable_stress_mpa']) {
-    if (asked(requirements, name) <= 0) fault(name, 'this is above 0');
+    if (asked(requirements, name) <= 0) fault(name, t('requirement.positive'));
   }
   const lobes = lobesAsked(requirements);
-  if (!Number.isInteger(lobes) || lobes < 2) fault('lobes', 'a whole number, 2 or more');
+  if (!Number.isInteger(lobes) || lobes < 2) fault('lobes', t('requirement.lobes'));
   const counts = goalsOf(requirements).length;
-  if (counts === 0) fault('goals', 'choose at least one');
-  if (counts > MOST_GOALS) fault('goals', `choose at most ${MOST_GOALS}`);
-  if (!WAVE_GENERATORS.some(({ name }) => asked(requirements, `wave_generators/${name}`))) fault('kinds', 'choose at least one wave generator');
-  if (!SHAPES.some(({ name }) => asked(requirements, `shapes/${name}`))) fault('kinds', 'choose at least one shape of teeth');
+  if (counts === 0) fault('goals', t('requirement.one_goal'));
+  if (counts > MOST_GOALS) fault('goals', t('requirement.most_goals', { count: MOST_GOALS }));
+  if (!WAVE_GENERATORS.some(({ name }) => asked(requirements, `wave_generators/${name}`))) fault('kinds', t('requirement.one_wave_generator'));
+  if (!SHAPES.some(({ name }) => asked(requirements, `shapes/${name}`))) fault('kinds', t('requirement.one_shape'));
   const isEmpty = ['ratio', 'output_torque_nm', 'outer_diameter_mm', 'width_mm', 'allowable_stress_mpa'].some((name) => asked(requirements, name) === undefined);
   return { faults, isEmpty };
 }
@@ -258,10 +246,11 @@ export function searchesOf(requirements) {
   for (const wave of WAVE_GENERATORS.filter(({ name }) => asked(requirements, `wave_generators/${name}`))) {
     const { lobes, fixed, free: waveFree } = wave.of(requirements);
     for (const shape of SHAPES.filter(({ name }) => asked(requirements, `shapes/${name}`))) {
-      const label = `${wave.name === 'harmonic_more' ? `${lobes} lobes` : wave.label.split(',')[0]}, ${wave.label.split(', ')[1]}, ${shape.label}`;
+      const kind = wave.name === 'harmonic_more' ? t('requirement.more_lobes', { lobes }) : t(`label.${ROOT}/wave_generators/${wave.name}`);
+      const label = t('requirement.search', { wave_generator: kind, shape: t(`label.${ROOT}/shapes/${shape.name}`) });
       const [fewest, mostSlots] = [Math.ceil(lobes * least - 1e-9), Math.floor(lobes * most + 1e-9)];
       if (fewest > mostSlots) {
-        searches.push({ label, fault: lobes === 1 ? 'with one lobe a ratio is a whole number' : `with ${lobes} lobes a ratio is a multiple of 1/${lobes}` });
+        searches.push({ label, fault: counted('requirement.no_ratio', lobes) });
         continue;
       }
       const toothMm = Math.min(0.3 * rootMm, (Math.PI * rootMm) / fewest);
@@ -269,7 +258,7 @@ export function searchesOf(requirements) {
       const radiusRange = [0.08 * toothMm, Math.min(toothMm, widthMm)];
       const radii = asked(requirements, 'standard') ? standardRadiiMm(shape.name, radiusRange) : undefined;
       if (radii?.length === 0) {
-        searches.push({ label, fault: 'no standard diameter fits into this space' });
+        searches.push({ label, fault: t('requirement.no_standard') });
         continue;
       }
       const ranges = {

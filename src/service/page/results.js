@@ -4,12 +4,13 @@ import { html, setProperties, setText, symbol } from './dom.js';
 import { DASH, difference, number } from './format.js';
 import { CONTACTS } from './motion.js';
 import { term } from './terms.js';
+import { listed, t, textOf } from './texts.js';
 
 const row = (label, sign, unit, get, more) => ({ label, symbol: sign, unit, get, ...more });
 
 const peakRows = (field, name, sign, unit) =>
   CONTACTS.map(({ key, name: contact, index }) =>
-    row(`${name}, ${contact.toLowerCase()}`, `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field].value, {
+    row(t('result.of', { what: name, part: contact.toLowerCase() }), `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field].value, {
       place: ({ sweep }) => sweep.peaks[key][field],
     }),
   );
@@ -17,53 +18,31 @@ const peakRows = (field, name, sign, unit) =>
 /** What goes with the largest stress of each contact. */
 const contactRows = (field, name, sign, unit) =>
   CONTACTS.map(({ key, name: contact, index }) =>
-    row(`${name}, ${contact.toLowerCase()}`, `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field]),
+    row(t('result.of', { what: name, part: contact.toLowerCase() }), `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field]),
   );
 
 const least = (column) => column?.reduce((most, value) => Math.min(most, value));
 const greatest = (column) => column?.reduce((most, value) => Math.max(most, value));
 
 const percent = (share) => `${share > 0 ? '+' : share < 0 ? '−' : ''}${Math.abs(Math.round(100 * share))}`;
-const span = ({ low, high }) => `${percent(low)} to ${percent(high)} %`;
-const BEYOND = {
-  law: 'other sizes and loads under its law',
-  tooth_shape: 'its shape of teeth',
-  lobes: 'its lobes',
-  ring_with_more_teeth: 'a ring with more teeth',
-  pressure_angle: 'a steeper flank',
-  entry_under_load: 'teeth that enter under load',
-  materials: 'unlike materials',
-  gap: 'larger clearances',
-  wind_up: 'a larger wind-up',
-  modification: 'its modification',
-  series_compliance: 'what gives way behind its contacts',
-  soft_backing: 'soft parts behind its contacts',
-  half_width: 'wider contacts',
-};
+const span = ({ low, high }) => t('result.span', { low: percent(low), high: percent(high) });
 
 /** How far to believe some numbers: what the model was found to err by in drives of this case, calculated as elastic bodies. What is not like
  *  those drives is said once, at the peaks. */
 function believed(what, { sweep }, saysWhatIsUnlike) {
   if (!sweep) return '';
   const { measured, beyond } = sweep.model_error;
-  if (!measured) return 'The model’s own error: not measured under this law.';
-  const outside = saysWhatIsUnlike && beyond.length > 0 ? `; not measured with ${beyond.map((reason) => BEYOND[reason] ?? reason.replaceAll('_', ' ')).join(', ')}` : '';
-  return `The model’s own error: ${what(measured)}${outside}.`;
+  if (!measured) return t('error.not_measured');
+  const unlike = listed(beyond.map((reason) => textOf(`error.beyond.${reason}`) ?? reason.replaceAll('_', ' ')));
+  return saysWhatIsUnlike && beyond.length > 0 ? t('error.measured_beyond', { error: what(measured), unlike }) : t('error.measured', { error: what(measured) });
 }
-
-const HELD = {
-  housed: 'a housed rim and fingers held at both ends',
-  slender_fingers: 'slender fingers',
-  fingers_at_one_end: 'fingers held at one end',
-  free_rim: 'a rim with nothing around it',
-};
 
 /** What comes on top for how the parts are held. */
 function heldAs({ sweep }) {
   const { held } = sweep.model_error;
   if (!held) return '';
-  const earlier = held.wind_up ? `, ${span(held.wind_up)} in earlier calculations of elastic bodies` : '';
-  return ` Besides, for ${HELD[held.case] ?? held.case}: by the estimates ${percent(held.estimated_wind_up)} %${earlier}.`;
+  const how = { case: textOf(`error.held.${held.case}`) ?? held.case, estimated: percent(held.estimated_wind_up), earlier: held.wind_up && span(held.wind_up) };
+  return ` ${held.wind_up ? t('error.held_as_earlier', how) : t('error.held_as', how)}`;
 }
 
 /** The contact that carries the largest of a quantity. */
@@ -77,7 +56,7 @@ const largestRow = (label, field, unit) =>
   row(label, '', unit, (answers) => largest(field, answers)?.peak.value, {
     note: (answers) => {
       const { name, peak } = largest(field, answers);
-      return `${name.toLowerCase()}, ψ ${number(peak.position_deg, 3)}°`;
+      return t('result.peak_at', { part: name.toLowerCase(), position: number(peak.position_deg, 3) });
     },
   });
 
@@ -86,19 +65,19 @@ const lossRow = (label, sign, unit, get, more) => row(label, sign, unit, ({ swee
 
 const percentRow = (label, sign, get, more) => lossRow(label, sign, '%', (losses) => { const share = get(losses); return share === undefined ? undefined : 100 * share; }, more);
 
-const PLACES = [...CONTACTS.map(({ key, name }) => ({ key, name: key === 'wave_generator' ? 'cam or race' : name.toLowerCase() })), { key: 'bearing', name: 'bearing' }];
+const PLACES = ['wave_generator', 'ring', 'carrier', 'bearing'];
 
 const lossRows = [
-  percentRow('Efficiency, ring fixed', 'η', ({ efficiency }) => efficiency.ring_fixed, { significant: 4 }),
-  percentRow('Driven from behind, ring fixed', 'η', ({ efficiency }) => efficiency.ring_fixed_back_driven, {
-    text: ({ sweep: { losses } }) => (losses.self_locking ? 'locks itself' : `${number(100 * losses.efficiency.ring_fixed_back_driven, 4)} %`),
+  percentRow(t('losses.efficiency'), 'η', ({ efficiency }) => efficiency.ring_fixed, { significant: 4 }),
+  percentRow(t('result.back_driven'), 'η', ({ efficiency }) => efficiency.ring_fixed_back_driven, {
+    text: ({ sweep: { losses } }) => (losses.self_locking ? t('result.locks') : `${number(100 * losses.efficiency.ring_fixed_back_driven, 4)} %`),
   }),
-  percentRow('The efficiency may be off by', '', ({ efficiency_error: error }) => error, { significant: 2 }),
-  lossRow('Input torque with losses, ring fixed', 'M', 'N·m', ({ required_input_torque_nm: torque }) => torque),
-  lossRow('Power lost, ring fixed', 'P', 'W', ({ power_loss_w: power }) => power),
-  ...PLACES.map(({ key, name }) => percentRow(`Of it at the ${name}`, '', ({ loss_ratio: whole, loss_ratio_by_place: part }) => (whole > 0 ? part[key] / whole : undefined), { significant: 3 })),
+  percentRow(t('result.efficiency_error'), '', ({ efficiency_error: error }) => error, { significant: 2 }),
+  lossRow(t('result.required_torque'), 'M', 'N·m', ({ required_input_torque_nm: torque }) => torque),
+  lossRow(t('result.power_loss'), 'P', 'W', ({ power_loss_w: power }) => power),
+  ...PLACES.map((place) => percentRow(t(`result.loss_at.${place}`), '', ({ loss_ratio: whole, loss_ratio_by_place: part }) => (whole > 0 ? part[place] / whole : undefined), { significant: 3 })),
   ...CONTACTS.map(({ key, name, index }) =>
-    lossRow(`Pressure times velocity, ${name.toLowerCase()}`, `pv_${index}`, 'MPa m/s', ({ pressure_velocity_mpa_m_per_s: peaks }) => peaks?.[key].value, {
+    lossRow(t('result.of', { what: t('plot.rubbing'), part: name.toLowerCase() }), `pv_${index}`, 'MPa m/s', ({ pressure_velocity_mpa_m_per_s: peaks }) => peaks?.[key].value, {
       place: ({ sweep }) => sweep.losses.pressure_velocity_mpa_m_per_s[key],
       significant: 4,
       terms: key === 'wave_generator' ? ['pressure_velocity'] : undefined,
@@ -106,33 +85,27 @@ const lossRows = [
   ),
   ...CONTACTS.map(({ key, name }) => {
     const wear = (losses) => losses.wear_mm_per_hour?.[key];
-    return lossRow(`Wear, ${name.toLowerCase()}, µm/h`, '', '', (losses) => wear(losses) && 1000 * wear(losses).value, {
+    return lossRow(t('result.wear', { part: name.toLowerCase() }), '', '', (losses) => wear(losses) && 1000 * wear(losses).value, {
       significant: 3,
       place: ({ sweep }) => (wear(sweep.losses).position_deg === undefined ? undefined : wear(sweep.losses)),
       terms: key === 'wave_generator' ? ['wear'] : undefined,
     });
   }),
-  lossRow('Mean load on the bearing', 'P', 'N', ({ bearing }) => bearing?.mean_load_n),
-  lossRow('Life of the bearing, h', 'L_10', '', ({ bearing }) => bearing?.life_h, { significant: 3 }),
+  lossRow(t('result.bearing_load'), 'P', 'N', ({ bearing }) => bearing?.mean_load_n),
+  lossRow(t('result.bearing_life'), 'L_10', '', ({ bearing }) => bearing?.life_h, { significant: 3 }),
 ];
 
-const BACKINGS = {
-  cam_on_bore: 'Cam on its bore',
-  housed_rim: 'Rim in a housing',
-  free_rim: 'Rim with nothing around it',
-  finger_at_both_ends: 'Finger held at both ends',
-  finger_at_one_end: 'Finger held at one end',
-};
+const BACKINGS = ['cam_on_bore', 'housed_rim', 'free_rim', 'finger_at_both_ends', 'finger_at_one_end'];
 
 /** What parts behind the contacts are estimated to give way, to be taken over as series compliance. */
-const backingRows = Object.entries(BACKINGS).map(([key, label]) => {
+const backingRows = BACKINGS.map((key) => {
   const of = ({ sweep }) => sweep?.series_compliance_estimates?.find(({ backing }) => backing === key);
-  return row(label, '', 'mm/N', (answers) => of(answers)?.compliance_mm_per_n, {
+  return row(t(`result.backing.${key}`), '', 'mm/N', (answers) => of(answers)?.compliance_mm_per_n, {
     significant: 3,
     taken: (answers) => {
       const { contact, compliance_mm_per_n: compliance, share } = of(answers);
-      const adds = share === undefined ? '' : `, adds ${number(100 * share, 2)} %`;
-      return { pointer: `/model/series_compliance_mm_per_n/${contact}`, value: Number(compliance.toPrecision(3)), text: `take over${adds}` };
+      const text = share === undefined ? t('result.take_over') : t('result.take_over_adds', { percent: number(100 * share, 2) });
+      return { pointer: `/model/series_compliance_mm_per_n/${contact}`, value: Number(compliance.toPrecision(3)), text };
     },
   });
 });
@@ -141,42 +114,42 @@ const backlashOf = ({ sweep }) => sweep?.wind_up?.backlash;
 const backlashRow = (label, get) => row(label, '', 'arcmin', (answers) => backlashOf(answers) && get(backlashOf(answers)), { significant: 4 });
 
 const backlashRows = [
-  backlashRow('Mean backlash of the output', ({ mean_arcmin: mean }) => mean),
-  backlashRow('Least backlash of the output', ({ smallest_arcmin: smallest }) => smallest),
-  backlashRow('Most backlash of the output', ({ largest_arcmin: largest }) => largest),
-  ...CONTACTS.map(({ key, name }) => backlashRow(`Backlash by ${name.toLowerCase()}`, ({ contribution_arcmin: part }) => part[key])),
+  backlashRow(t('result.backlash_mean'), ({ mean_arcmin: mean }) => mean),
+  backlashRow(t('result.backlash_least'), ({ smallest_arcmin: smallest }) => smallest),
+  backlashRow(t('result.backlash_most'), ({ largest_arcmin: largest }) => largest),
+  ...CONTACTS.map(({ key, name }) => backlashRow(t('result.backlash_by', { part: name.toLowerCase() }), ({ contribution_arcmin: part }) => part[key])),
 ];
 
 const backlashTile = {
-  ...backlashRow('Mean backlash', ({ mean_arcmin: mean }) => mean),
-  note: (answers) => `${number(backlashOf(answers).smallest_arcmin, 4)} to ${number(backlashOf(answers).largest_arcmin, 4)} arcmin, unloaded`,
+  ...backlashRow(t('result.backlash'), ({ mean_arcmin: mean }) => mean),
+  note: (answers) => t('result.backlash_range', { least: number(backlashOf(answers).smallest_arcmin, 4), most: number(backlashOf(answers).largest_arcmin, 4) }),
   state: (answers) => (backlashOf(answers).smallest_arcmin < -1e-9 ? 'warning' : ''),
   isOptional: true,
 };
 
 /** Always in sight, however far one scrolls. */
 const KEY_ROWS = [
-  row('Ratio, ring fixed', '', '', ({ geometry }) => geometry?.transmission_ratio),
-  row('Contact ratio', '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
-    note: ({ coincidence }) => `from ψ ${number(coincidence.engagement.start_deg, 4)}°`,
+  row(t('label./ratio'), '', '', ({ geometry }) => geometry?.transmission_ratio),
+  row(t('result.contact_ratio'), '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
+    note: ({ coincidence }) => t('result.from_position', { position: number(coincidence.engagement.start_deg, 4) }),
     terms: ['coincidence', 'position'],
   }),
-  row('Teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
-    text: ({ coincidence: { teeth_in_mesh_per_zone: { min, max } } }) => (min === max ? `${min}` : `${min} to ${max}`),
+  row(t('result.teeth_in_mesh'), '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
+    text: ({ coincidence: { teeth_in_mesh_per_zone: { min, max } } }) => (min === max ? `${min}` : t('tolerance.range', { low: min, high: max })),
     scoped: true,
   }),
-  largestRow('Largest force', 'force_n', 'N'),
-  largestRow('Largest stress', 'stress_mpa', 'MPa'),
-  percentRow('Efficiency', '', ({ efficiency }) => efficiency.ring_fixed, {
+  largestRow(t('result.largest_force'), 'force_n', 'N'),
+  largestRow(t('result.largest_stress'), 'stress_mpa', 'MPa'),
+  percentRow(t('result.efficiency'), '', ({ efficiency }) => efficiency.ring_fixed, {
     significant: 3,
-    note: ({ sweep: { losses } }) => (losses.self_locking ? 'ring fixed; locks itself' : `ring fixed; ${number(100 * losses.efficiency.ring_fixed_back_driven, 3)} % from behind`),
+    note: ({ sweep: { losses } }) => (losses.self_locking ? t('result.ring_fixed_locks') : t('result.ring_fixed', { percent: number(100 * losses.efficiency.ring_fixed_back_driven, 3) })),
     isOptional: true,
   }),
   backlashTile,
-  row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
-    text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
+  row(t('result.undercut'), '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
+    text: ({ geometry }) => (geometry.undercut.occurs ? t('result.yes') : t('result.no')),
     note: ({ geometry: { undercut } }) =>
-      undercut.critical_tooth_radius_mm === undefined ? 'at no radius' : `critical r ${number(undercut.critical_tooth_radius_mm, 4)} mm`,
+      undercut.critical_tooth_radius_mm === undefined ? t('result.no_radius') : t('result.critical', { radius: number(undercut.critical_tooth_radius_mm, 4) }),
     state: ({ geometry }) => (geometry.undercut.occurs ? 'warning' : 'good'),
     keepsNote: true,
   }),
@@ -184,104 +157,104 @@ const KEY_ROWS = [
 
 export const GROUPS = [
   {
-    title: 'Peaks over a period',
-    told: (answers) => believed(({ force, stress }) => `force ${span(force)}, stress ${span(stress)}`, answers, true),
-    rows: [...peakRows('force_n', 'Force', 'F', 'N'), ...peakRows('stress_mpa', 'Contact stress', 'σ', 'MPa')],
+    title: t('result.group.peaks'),
+    told: (answers) => believed(({ force, stress }) => t('error.force_and_stress', { force: span(force), stress: span(stress) }), answers, true),
+    rows: [...peakRows('force_n', t('result.force'), 'F', 'N'), ...peakRows('stress_mpa', t('plot.stress'), 'σ', 'MPa')],
   },
   {
-    title: 'Torque capacity at the allowable stress',
+    title: t('result.group.capacity'),
     offer: '/load/allowable_stress_mpa',
     rows: [
-      row('Input torque', 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
-      row('Output torque', 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm),
-      row('Limited by', '', '', ({ sweep }) => sweep?.torque_capacity?.limited_by, {
+      row(t('label./load/input_torque_nm'), 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
+      row(t('label./load/output_torque_nm'), 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm),
+      row(t('result.limited_by'), '', '', ({ sweep }) => sweep?.torque_capacity?.limited_by, {
         text: ({ sweep }) =>
           sweep.torque_capacity.turns_past_teeth
-            ? 'turning past the teeth'
+            ? t('result.turns_past')
             : CONTACTS.find(({ key }) => key === sweep.torque_capacity.limited_by).name.toLowerCase(),
       }),
-      row('At the input angle', 'j', 'deg', ({ sweep }) => sweep?.torque_capacity?.input_angle_deg),
+      row(t('result.capacity_angle'), 'j', 'deg', ({ sweep }) => sweep?.torque_capacity?.input_angle_deg),
     ],
   },
   {
-    title: 'Wind-up and stiffness',
+    title: t('result.group.wind_up'),
     offer: '/sweep/wind_up',
-    told: (answers) => (answers.sweep?.wind_up ? `${believed(({ wind_up: windUp }) => `wind-up ${span(windUp)} where bodies are held at the law’s depth`, answers, false)}${heldAs(answers)}` : ''),
+    told: (answers) => (answers.sweep?.wind_up ? `${believed(({ wind_up: windUp }) => t('error.wind_up', { wind_up: span(windUp) }), answers, false)}${heldAs(answers)}` : ''),
     rows: [
-      row('Least wind-up of the input', 'Δφ', 'deg', ({ sweep }) => least(sweep?.wind_up?.wind_up_deg)),
-      row('Most wind-up of the input', 'Δφ', 'deg', ({ sweep }) => greatest(sweep?.wind_up?.wind_up_deg)),
-      row('Least torsional stiffness of the output, N·m/rad', '', '', ({ sweep }) => least(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
-      row('Most torsional stiffness of the output, N·m/rad', '', '', ({ sweep }) => greatest(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
-      row('Transmission error, peak to peak', '', 'deg', ({ sweep }) => sweep?.wind_up?.transmission_error_peak_to_peak_deg),
+      row(t('result.wind_up_least'), 'Δφ', 'deg', ({ sweep }) => least(sweep?.wind_up?.wind_up_deg)),
+      row(t('result.wind_up_most'), 'Δφ', 'deg', ({ sweep }) => greatest(sweep?.wind_up?.wind_up_deg)),
+      row(t('result.stiffness_least'), '', '', ({ sweep }) => least(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
+      row(t('result.stiffness_most'), '', '', ({ sweep }) => greatest(sweep?.wind_up?.torsional_stiffness_nm_per_rad)),
+      row(t('result.transmission_error'), '', 'deg', ({ sweep }) => sweep?.wind_up?.transmission_error_peak_to_peak_deg),
       ...backlashRows,
     ],
   },
-  { title: 'Friction losses and wear', offer: '/friction/wave_generator', rows: lossRows },
+  { title: t('result.group.losses'), offer: '/friction/wave_generator', rows: lossRows },
   {
-    title: 'Motion and mesh',
+    title: t('result.group.motion'),
     rows: [
-      row('Ratio, ring fixed', 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
-      row('Ratio, carrier fixed', 'i_HK', '', ({ geometry }) => geometry?.transmission_ratio_carrier_fixed),
-      row('Ratio of ring to carrier, wave generator fixed', 'i_KG', '', ({ geometry }) => geometry?.members.wave_generator_fixed.ratio),
-      row('Ring fixed, its torque over the input’s', '', '', ({ geometry }) => geometry?.members.ring_fixed.holding_torque_ratio, { followsFromRatio: true }),
-      row('Carrier fixed, its torque over the input’s', '', '', ({ geometry }) => geometry?.members.carrier_fixed.holding_torque_ratio, { followsFromRatio: true }),
-      row('Wave generator fixed, its over the ring’s', '', '', ({ geometry }) => geometry?.members.wave_generator_fixed.holding_torque_ratio, { followsFromRatio: true }),
-      row('Period of the load pattern', '', 'deg', ({ geometry }) => geometry?.period_deg),
-      row('Contact ratio, all zones', 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
-      row('Fewest teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min, { scoped: true }),
-      row('Most teeth in mesh', '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, { scoped: true }),
-      row('Fewest teeth that carry', '', '', ({ sweep }) => sweep?.carrying_teeth?.min, { scoped: true }),
-      row('Most teeth that carry', '', '', ({ sweep }) => sweep?.carrying_teeth?.max, { scoped: true }),
-      row('Engagement begins, from a lobe’s middle', 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg, { terms: ['position'] }),
-      row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
-        text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
+      row(t('label./ratio'), 'i_HG', '', ({ geometry }) => geometry?.transmission_ratio),
+      row(t('result.ratio_carrier_fixed'), 'i_HK', '', ({ geometry }) => geometry?.transmission_ratio_carrier_fixed),
+      row(t('result.ratio_wave_generator_fixed'), 'i_KG', '', ({ geometry }) => geometry?.members.wave_generator_fixed.ratio),
+      row(t('result.torque_ring_fixed'), '', '', ({ geometry }) => geometry?.members.ring_fixed.holding_torque_ratio, { followsFromRatio: true }),
+      row(t('result.torque_carrier_fixed'), '', '', ({ geometry }) => geometry?.members.carrier_fixed.holding_torque_ratio, { followsFromRatio: true }),
+      row(t('result.torque_wave_generator_fixed'), '', '', ({ geometry }) => geometry?.members.wave_generator_fixed.holding_torque_ratio, { followsFromRatio: true }),
+      row(t('result.period'), '', 'deg', ({ geometry }) => geometry?.period_deg),
+      row(t('result.contact_ratio_all'), 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
+      row(t('result.mesh_fewest'), '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min, { scoped: true }),
+      row(t('result.mesh_most'), '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, { scoped: true }),
+      row(t('result.carrying_fewest'), '', '', ({ sweep }) => sweep?.carrying_teeth?.min, { scoped: true }),
+      row(t('result.carrying_most'), '', '', ({ sweep }) => sweep?.carrying_teeth?.max, { scoped: true }),
+      row(t('result.engagement'), 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg, { terms: ['position'] }),
+      row(t('result.undercut'), '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
+        text: ({ geometry }) => (geometry.undercut.occurs ? t('result.yes') : t('result.no')),
       }),
-      row('Critical tooth radius', 'r_c', 'mm', ({ geometry }) => geometry?.undercut.critical_tooth_radius_mm, { significant: 6 }),
+      row(t('result.critical_radius'), 'r_c', 'mm', ({ geometry }) => geometry?.undercut.critical_tooth_radius_mm, { significant: 6 }),
     ],
   },
   {
-    title: 'Sizes and clearances',
+    title: t('result.group.sizes'),
     rows: [
-      row('Ring root radius', '', 'mm', ({ geometry }) => geometry?.ring.root_radius_mm),
-      row('Ring tip radius', '', 'mm', ({ geometry }) => geometry?.ring.tip_radius_mm),
-      row('Ring tooth height', '', 'mm', ({ geometry }) => geometry?.ring.tooth_height_mm),
-      row('Largest pressure angle, ring', 'β', 'deg', ({ geometry }) => geometry?.ring.pressure_angle_max_deg),
-      row('Largest pressure angle, cam', 'γ', 'deg', ({ geometry }) => geometry?.wave_generator.pressure_angle_max_deg),
-      row('Radial space for the carrier', '', 'mm', ({ geometry }) => geometry?.carrier.radial_space_mm),
-      row('Thinnest wall between slots', '', 'mm', ({ geometry }) => geometry?.carrier.slot_wall_mm),
-      row('Least gap between teeth', '', 'mm', ({ geometry }) => geometry?.teeth.gap_min_mm),
+      row(t('result.root_radius'), '', 'mm', ({ geometry }) => geometry?.ring.root_radius_mm),
+      row(t('result.tip_radius'), '', 'mm', ({ geometry }) => geometry?.ring.tip_radius_mm),
+      row(t('result.tooth_height'), '', 'mm', ({ geometry }) => geometry?.ring.tooth_height_mm),
+      row(t('result.pressure_angle_ring'), 'β', 'deg', ({ geometry }) => geometry?.ring.pressure_angle_max_deg),
+      row(t('result.pressure_angle_cam'), 'γ', 'deg', ({ geometry }) => geometry?.wave_generator.pressure_angle_max_deg),
+      row(t('result.radial_space'), '', 'mm', ({ geometry }) => geometry?.carrier.radial_space_mm),
+      row(t('result.slot_wall'), '', 'mm', ({ geometry }) => geometry?.carrier.slot_wall_mm),
+      row(t('result.tooth_gap'), '', 'mm', ({ geometry }) => geometry?.teeth.gap_min_mm),
     ],
   },
   {
-    title: 'Below the surface, where the stress peaks',
+    title: t('result.group.depth'),
     isMore: true,
     rows: [
-      ...contactRows('half_width_mm', 'Half-width of the contact', 'w', 'mm'),
-      ...contactRows('half_length_mm', 'Half-length of the contact, along the axis', 'c', 'mm'),
-      ...contactRows('shear_stress_mpa', 'Largest shear stress', 'τ', 'MPa'),
-      ...contactRows('shear_depth_mm', 'Its depth', 'z', 'mm'),
+      ...contactRows('half_width_mm', t('result.half_width'), 'w', 'mm'),
+      ...contactRows('half_length_mm', t('result.half_length'), 'c', 'mm'),
+      ...contactRows('shear_stress_mpa', t('result.shear_stress'), 'τ', 'MPa'),
+      ...contactRows('shear_depth_mm', t('result.shear_depth'), 'z', 'mm'),
     ],
   },
   {
-    title: 'Compliance of the supports, estimated',
+    title: t('result.group.compliance'),
     isMore: true,
     // To work with, not to report: what was taken over stands in the design.
     isOnScreenAlone: true,
-    told: ({ sweep }) => (sweep?.series_compliance_estimates?.length > 0 ? 'From the parts as they are made; forces leave it out until it is taken over.' : ''),
+    told: ({ sweep }) => (sweep?.series_compliance_estimates?.length > 0 ? t('result.estimated') : ''),
     rows: backingRows,
   },
   {
-    title: 'Checks of the calculation',
+    title: t('result.group.checks'),
     isMore: true,
     rows: [
-      row('Torque balance, residual', '', '', ({ sweep }) => sweep?.checks.torque_balance_residual, { noDifference: true }),
-      row('Period closure, residual', '', '', ({ sweep }) => sweep?.checks.period_closure_residual, { noDifference: true }),
+      row(t('result.torque_balance'), '', '', ({ sweep }) => sweep?.checks.torque_balance_residual, { noDifference: true }),
+      row(t('result.period_closure'), '', '', ({ sweep }) => sweep?.checks.period_closure_residual, { noDifference: true }),
     ],
   },
 ];
 
 /** What a count of teeth is over: where zones are unlike, over all of them. */
-const scopeOf = ({ scoped }, { zones }) => (scoped ? (zones?.areAlike === false ? ', all zones' : ', each zone') : '');
+const scopeOf = ({ scoped }, { zones }) => (scoped ? (zones?.areAlike === false ? t('result.all_zones') : t('result.each_zone')) : '');
 
 function show(entry, answers) {
   const value = entry.get(answers);
@@ -295,7 +268,7 @@ function compare(entry, answers, reference) {
   const other = entry.get(reference);
   if (value === undefined || other === undefined || entry.noDifference) return '';
   if (!entry.text) return difference(value, other);
-  return entry.text(answers) === entry.text(reference) ? '=' : 'differs';
+  return entry.text(answers) === entry.text(reference) ? '=' : t('result.differs');
 }
 
 export class Results {
@@ -317,12 +290,12 @@ export class Results {
       keyFigures.append(tile);
     }
     this.table = table;
-    const head = html('tr', {}, html('th', { scope: 'col' }, 'Result'), html('th', { scope: 'col', class: 'numeric' }, 'This design'));
-    this.headings = ['Reference', 'Difference'].map((text) => html('th', { scope: 'col', class: 'numeric compared' }, text));
-    head.append(...this.headings, html('th', { scope: 'col' }, 'Where'));
+    const head = html('tr', {}, html('th', { scope: 'col' }, t('result.result')), html('th', { scope: 'col', class: 'numeric' }, t('comparison.this_design')));
+    this.headings = [t('comparison.reference'), t('comparison.difference')].map((text) => html('th', { scope: 'col', class: 'numeric compared' }, text));
+    head.append(...this.headings, html('th', { scope: 'col' }, t('result.where')));
     table.append(html('thead', {}, head));
     for (const group of GROUPS) {
-      const offer = group.offer && html('button', { type: 'button', class: 'link', 'aria-label': `${group.title}: ask for it`, onclick: () => onAsk(group.offer) }, 'ask for it');
+      const offer = group.offer && html('button', { type: 'button', class: 'link', 'aria-label': t('result.ask_for', { what: group.title }), onclick: () => onAsk(group.offer) }, t('result.ask'));
       const told = group.told && html('span', { class: 'told' });
       if (told) this.#told.push({ group, told });
       const heading = html('tr', { class: group.isOnScreenAlone ? 'group unasked' : 'group' }, html('th', { scope: 'rowgroup', colspan: 5 }, group.title, offer && [' ', offer], told && [' ', told]));
@@ -334,9 +307,9 @@ export class Results {
         // Words stand where numbers have their unit.
         const [unit, referenceUnit] = [value, reference].map(() => !entry.text && html('span', { class: 'unit' }));
         const delta = html('td', { class: 'numeric compared number' });
-        const place = entry.place && html('button', { type: 'button', class: 'link number', title: 'Show in mechanism and plots' });
+        const place = entry.place && html('button', { type: 'button', class: 'link number', title: t('result.show') });
         const scope = entry.scoped && html('span');
-        const taken = entry.taken && html('button', { type: 'button', class: 'link number', 'aria-label': `${entry.label}: take over as series compliance` });
+        const taken = entry.taken && html('button', { type: 'button', class: 'link number', 'aria-label': t('result.take_over_as', { what: entry.label }) });
         const cell = { entry, taken, scope, value, unit, reference, referenceUnit, delta, place };
         place?.addEventListener('click', () => onShow(cell.at));
         taken?.addEventListener('click', () => onTake(entry.taken(cell.answers)));
@@ -358,7 +331,7 @@ export class Results {
   #noteOf(entry, answers, reference) {
     if (!reference || entry.keepsNote) return entry.note?.(answers) ?? '';
     const difference = compare(entry, answers, reference);
-    return difference === 'differs' ? `reference: ${entry.text(reference)}` : difference;
+    return difference === t('result.differs') ? t('result.reference', { value: entry.text(reference) }) : difference;
   }
 
   /** Shows answers in the tiles and the table, and beside them those of a reference. What has no answer keeps its place but no number; `isHeld`

@@ -2,10 +2,11 @@
 
 import { Choice, NumberBox } from './ask.js';
 import { html, setText } from './dom.js';
-import { readable, sentence } from './findings.js';
 import { DASH, difference, number, withUnit } from './format.js';
 import { wordsOf } from './parameters.js';
 import { StudyView } from './study-view.js';
+import { counted, labelled, t } from './texts.js';
+import { detailOf, sentence } from './words.js';
 
 const FIRST_QUANTITY = 'peak_stress_mpa';
 /** How far a number is moved where nobody says otherwise. */
@@ -19,22 +20,22 @@ export class Sensitivity extends StudyView {
   #pointers = [];
 
   constructor(section, { quantities, goTo }) {
-    super({ mostAtOnce: MOST_AT_ONCE, verb: 'Look again' });
+    super({ mostAtOnce: MOST_AT_ONCE, verb: t('sensitivity.look_again') });
     this.quantities = quantities;
     this.goTo = goTo;
-    this.quantity = new Choice('Quantity', () => this.#show());
+    this.quantity = new Choice(t('study.quantity'), () => this.#show());
     this.value = html('p', { class: 'headline' });
     this.table = html('table', { class: 'drives tornado' });
     this.reasons = html('ul', { class: 'plain' });
-    this.reset = html('button', { type: 'button', class: 'link', hidden: true, onclick: () => this.#reset() }, 'Move all by 1 % again');
+    this.reset = html('button', { type: 'button', class: 'link', hidden: true, onclick: () => this.#reset() }, t('sensitivity.reset'));
     section.append(
-      html('header', {}, html('h2', { id: 'sensitivity-title', tabindex: '-1' }, 'Sensitivity')),
-      html('p', { class: 'none' }, 'Each number of the design is moved a little either way, by itself: by 1 %, or by what you say, such as its tolerance. What moves the quantity most stands first.'),
+      html('header', {}, html('h2', { id: 'sensitivity-title', tabindex: '-1' }, t('view.sensitivity'))),
+      html('p', { class: 'none' }, t('sensitivity.intro')),
       html('div', { class: 'ask' }, html('div', { class: 'ask-row' }, this.quantity.element, this.reset)),
       this.progress.element,
       this.state,
       this.value,
-      html('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': 'Ranking of the inputs' }, this.table),
+      html('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': t('sensitivity.ranking') }, this.table),
       this.reasons,
     );
   }
@@ -70,15 +71,15 @@ export class Sensitivity extends StudyView {
     const of = this.#answer?.quantities.find(({ quantity }) => quantity === this.quantity.value);
     this.reset.hidden = this.#plusMinus.size === 0;
     this.table.hidden = !of;
-    this.reasons.replaceChildren(...(this.#answer?.reasons ?? []).map(({ detail, variants }) => html('li', {}, `${variants === 1 ? 'One move has' : `${variants} moves have`} no answer: ${sentence(readable(detail))}`)));
+    this.reasons.replaceChildren(...(this.#answer?.reasons ?? []).map(({ variants, ...reason }) => html('li', {}, labelled(counted('sensitivity.no_answer', variants), sentence(detailOf(reason))))));
     if (!of) {
-      setText(this.value, this.#answer ? 'The design itself has no answer.' : '');
+      setText(this.value, this.#answer ? t('sensitivity.no_design') : '');
       return;
     }
     const { quantity, value, inputs } = of;
-    setText(this.value, `${this.quantities.get(quantity).label}: ${this.quantities.shown(quantity, value)}`);
+    setText(this.value, labelled(this.quantities.get(quantity).label, this.quantities.shown(quantity, value)));
     const most = Math.max(...inputs.map(({ change }) => change), Number.MIN_VALUE);
-    const head = ['Input', 'Moved by ±', 'Less', 'More', 'Change'];
+    const head = [t('comparison.input'), t('sensitivity.moved'), t('sensitivity.less'), t('sensitivity.more'), t('sensitivity.change')];
     this.table.replaceChildren(
       html('thead', {}, html('tr', {}, head.map((text, index) => html('th', { scope: 'col', class: index > 0 && index < 4 && 'numeric' }, text)))),
       html('tbody', {}, inputs.map((input) => this.#row(input, value, most))),
@@ -87,7 +88,7 @@ export class Sensitivity extends StudyView {
 
   #row({ pointer, value: given, plus_minus: plusMinus, at_minus: less, at_plus: more, is_smooth: isSmooth }, value, most) {
     const { label, unit } = wordsOf(pointer);
-    const box = new NumberBox(`${label}: moved by plus and minus${unit ? `, ${unit}` : ''}`, () => {
+    const box = new NumberBox(labelled(label, unit ? t('sensitivity.moved_by_unit', { unit }) : t('sensitivity.moved_by')), () => {
       if (box.fault === undefined && box.value > 0) this.#plusMinus.set(pointer, box.value);
       else this.#plusMinus.delete(pointer);
       this.later(0);
@@ -103,10 +104,10 @@ export class Sensitivity extends StudyView {
       part.style.width = `${100 * Math.abs(share)}%`;
       return part;
     };
-    const cell = (end) => html('td', { class: 'numeric number' }, end === undefined ? 'no answer' : difference(end, value));
+    const cell = (end) => html('td', { class: 'numeric number' }, end === undefined ? t('sensitivity.none') : difference(end, value));
     // Where one way has no answer its cell says so.
     const isUnlike = !isSmooth && less !== undefined && more !== undefined;
-    const words = [label, ' ', html('span', { class: 'unit' }, withUnit(number(given), unit)), isUnlike ? html('span', { class: 'unit' }, ', unlike either way') : ''];
+    const words = [label, ' ', html('span', { class: 'unit' }, withUnit(number(given), unit)), isUnlike ? html('span', { class: 'unit' }, t('sensitivity.unlike')) : ''];
     return html(
       'tr',
       {},

@@ -3,6 +3,8 @@
 
 import { isAsking, request } from './access.js';
 import { answerOf } from './answers.js';
+import { t } from './texts.js';
+import { problemInWords } from './words.js';
 
 /** A running evaluation is left to finish although a newer design waits, unless it takes much longer than the last one took:
  *  a dragged slider then shows every answer that it can get, instead of aborting each one just before it arrives. */
@@ -19,8 +21,6 @@ const SLOW_MS = 1000;
 const SUSPICIOUS_MS = 3000;
 const ALIVE_MS = 2000;
 const MOST_PATIENCE_MS = 48_000;
-
-const SILENT = 'The calculation service does not answer.';
 
 /** Whether the process answers at all, within its time. */
 const isAlive = () =>
@@ -53,12 +53,12 @@ export async function ask(path, design, { signal, accept = JSON_TYPE, kind } = {
     body = await (response.ok && accept !== JSON_TYPE ? response.blob() : answerOf(response, response.ok ? kind : undefined, signal));
   } catch (error) {
     if (signal?.aborted) throw error;
-    throw new Unavailable(SILENT);
+    throw new Unavailable(t('service.silent'));
   }
   if (response.status === 503) {
-    throw new Unavailable(body.detail, 1000 * Number(response.headers.get('retry-after') ?? 1));
+    throw new Unavailable(problemInWords(body).detail, 1000 * Number(response.headers.get('retry-after') ?? 1));
   }
-  if (!response.ok) return { problem: body };
+  if (!response.ok) return { problem: problemInWords(body) };
   const solve = /dur=([\d.]+)/.exec(response.headers.get('server-timing') ?? '');
   return { answer: body, solveMs: solve ? Number(solve[1]) : undefined };
 }
@@ -74,8 +74,9 @@ export async function evaluate(design, signal) {
   // The picture joins copies of one tooth, whatever extent the document asks for.
   const drawn = { ...design, profile: { ...design.profile, extent: 'tooth' } };
   const { answer, problem, solveMs } = await ask('v1/design', drawn, { signal, kind: 'design' });
-  const { geometry, coincidence_degree: coincidence, sweep, problems } = answer ?? { problems: { problem } };
-  return { design, answers: { zones: zonesOf(design), geometry, coincidence, sweep }, problems: Object.values(problems), solveMs: solveMs ?? 0 };
+  const { geometry, coincidence_degree: coincidence, sweep, problems = {} } = answer ?? {};
+  const told = problem ? [problem] : Object.values(problems).map(problemInWords);
+  return { design, answers: { zones: zonesOf(design), geometry, coincidence, sweep }, problems: told, solveMs: solveMs ?? 0 };
 }
 
 /** Documents that came or are under way, and how long the others are waited for. */
@@ -183,7 +184,7 @@ export class Service {
       this.#onSlow(age / 1000);
       if (age < SUSPICIOUS_MS || isProbed) return;
       isProbed = true;
-      if (!(await isAlive()) && this.#running === running) this.#setAway(true, SILENT);
+      if (!(await isAlive()) && this.#running === running) this.#setAway(true, t('service.silent'));
       isProbed = false;
     }, SLOW_MS);
   }
@@ -192,7 +193,7 @@ export class Service {
   async #beat() {
     if (document.hidden || this.#running) return;
     if (await isAlive()) return;
-    this.#setAway(true, SILENT);
+    this.#setAway(true, t('service.silent'));
     if (this.#last && !this.#running) this.request(this.#last);
   }
 

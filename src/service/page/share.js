@@ -1,5 +1,7 @@
 // The address and the file: both hold the design document as it goes over the wire.
 
+import { t } from './texts.js';
+
 function encode(design) {
   const bytes = new TextEncoder().encode(JSON.stringify(design));
   const binary = Array.from(bytes, (byte) => String.fromCharCode(byte)).join('');
@@ -45,9 +47,9 @@ export function fromText(text) {
   try {
     design = JSON.parse(text);
   } catch (error) {
-    throw new Error(`This is no JSON: ${error.message}`);
+    throw new Error(t('document.no_json', { fault: error.message }));
   }
-  if (!isObject(design)) throw new Error('A design document is a JSON object; this is another value.');
+  if (!isObject(design)) throw new Error(t('document.no_object'));
   return design;
 }
 
@@ -61,6 +63,12 @@ export function fingerprint(design) {
   let hash = 0x811c9dc5;
   for (const byte of new TextEncoder().encode(JSON.stringify(inOrder(design)))) hash = Math.imul(hash ^ byte, 0x01000193) >>> 0;
   return ((hash >>> 24) ^ (hash & 0xffffff)).toString(16).padStart(6, '0');
+}
+
+/** A file is named after its design: without what a file cannot be called, and with its fingerprint where others have the same title. */
+export function fileNameOf(title, ending, design) {
+  const words = title.replace(/[’']/g, '').replace(/[^\p{L}\p{N}_.]+/gu, '-').replace(/^-|-$/g, '').toLowerCase();
+  return `${words}${design ? `-${fingerprint(design)}` : ''}${ending}`;
 }
 
 /** What a design is called that comes from a file: its name without the endings that this page itself gave it. */

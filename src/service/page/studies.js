@@ -2,14 +2,14 @@
 
 import { request } from './access.js';
 import { answerOf } from './answers.js';
+import { t } from './texts.js';
+import { problemInWords } from './words.js';
 
 const JSON_TYPE = 'application/json';
 /** Between two looks at how a study stands. */
 const LOOK_MS = 250;
 /** A service that is full is asked again so often. */
 const MOST_ATTEMPTS = 20;
-
-const SILENT = 'The calculation service does not answer.';
 
 function pause(ms, signal) {
   return new Promise((resolve, reject) => {
@@ -37,11 +37,11 @@ async function send(path, { signal, kind, onFull, isAwaited = false, ...options 
       body = await answerOf(response, response.ok ? kind : undefined, during);
     } catch (error) {
       if (signal?.aborted) throw error;
-      return { problem: { title: SILENT, detail: 'Ask again when it does.', errors: [] } };
+      return { problem: { title: t('service.silent'), detail: t('service.ask_again'), errors: [] } };
     }
     if (response.ok) return { answer: body };
-    if (response.status !== 503 || attempt === MOST_ATTEMPTS) return { problem: body };
-    onFull?.(body.detail);
+    if (response.status !== 503 || attempt === MOST_ATTEMPTS) return { problem: problemInWords(body) };
+    onFull?.(problemInWords(body).detail);
     await pause(1000 * Number(response.headers.get('retry-after') ?? 1), signal);
   }
 }
@@ -89,7 +89,7 @@ export class Run {
     if (reply.problem) return { problem: reply.problem };
     const { state, problem, result, result_href: href } = reply.answer;
     const { answer = result, problem: lost } = result ? {} : await send(href.slice(1), { headers: { accept: JSON_TYPE }, signal, kind: 'result', onFull });
-    return { answer, state, problem: problem ?? lost };
+    return { answer, state, problem: problem ? problemInWords(problem) : lost };
   }
 
   /** Ends it early: what it has come to is its answer. */

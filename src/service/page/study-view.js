@@ -5,6 +5,7 @@ import { isSame } from './design.js';
 import { html } from './dom.js';
 import { number } from './format.js';
 import { Run } from './studies.js';
+import { t } from './texts.js';
 
 const DELAY_MS = 300;
 
@@ -46,7 +47,8 @@ export class StudyView {
       else {
         this.#run?.giveUp();
         this.progress.hide();
-        this.state.replaceChildren(fault ?? `${number(variants, 9)} variants ${isSlow ? 'take a while' : 'are many'}: press “${this.button.textContent}” for them.`);
+        const asked = { count: number(variants, 9), button: this.button.textContent };
+        this.state.replaceChildren(fault ?? (isSlow ? t('study.slow', asked) : t('study.many', asked)));
       }
     }, delay);
   }
@@ -63,13 +65,13 @@ export class StudyView {
     const run = new Run();
     this.#run = run;
     this.#asked = question;
-    const barTimer = setTimeout(() => this.progress.show(`${number(variants, 9)} variants…`), DELAY_MS);
+    const barTimer = setTimeout(() => this.progress.show(t('study.variants', { count: number(variants, 9) })), DELAY_MS);
     try {
       const { answer, state, problem } = await run.follow(question, ({ lookedAt, variants: all, full }) => {
         if (full) this.progress.show(full);
-        else this.progress.show(`${number(lookedAt, 9)} of ${number(all, 9)} variants`, lookedAt / all);
+        else this.progress.show(t('study.looked_at', { count: number(lookedAt, 9), all: number(all, 9) }), lookedAt / all);
       });
-      this.state.replaceChildren(...(problem ? [problemNote(problem)] : state === 'cancelled' ? ['Cancelled: what was looked at until then is shown.'] : []));
+      this.state.replaceChildren(...(problem ? [problemNote(problem)] : state === 'cancelled' ? [t('study.cancelled')] : []));
       if (answer) this.take(answer, asked);
       // What broke off may be asked for again.
       if (state !== 'done') this.#asked = undefined;

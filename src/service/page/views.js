@@ -1,15 +1,10 @@
 // What the page is about at the moment: the design, a search for one, or what studies tell of it.
 
 import { html } from './dom.js';
+import { t } from './texts.js';
 import { Toolbar } from './toolbar.js';
 
-export const VIEWS = [
-  { key: 'design', label: 'Design' },
-  { key: 'find', label: 'Find a drive' },
-  { key: 'explore', label: 'Explore' },
-  { key: 'sensitivity', label: 'Sensitivity' },
-  { key: 'tolerance', label: 'Tolerances' },
-];
+const VIEWS = ['design', 'find', 'explore', 'sensitivity', 'tolerance'];
 
 export class Views {
   #buttons;
@@ -17,7 +12,7 @@ export class Views {
   /** `onShow(key, isFromAddress)` when another view is shown. */
   constructor(bar, onShow) {
     this.onShow = onShow;
-    this.#buttons = new Map(VIEWS.map(({ key, label }) => [key, html('button', { type: 'button', 'data-view': key, onclick: () => this.show(key) }, label)]));
+    this.#buttons = new Map(VIEWS.map((key) => [key, html('button', { type: 'button', 'data-view': key, onclick: () => this.show(key) }, t(`view.${key}`))]));
     bar.append(...this.#buttons.values());
     this.#mark('design');
     new Toolbar(bar);
