@@ -11,6 +11,7 @@ use requirements::{
 };
 use serde::{Deserialize, Serialize};
 use toothwave_calculation::field::FieldCode;
+use toothwave_calculation::json::Tree;
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::{json, question};
