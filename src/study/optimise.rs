@@ -1,10 +1,11 @@
 //! A general optimiser: it proposes points of a unit cube, receives their objectives, and returns the Pareto front.
 //!
 //! It starts with a scan of a low-discrepancy sequence (M. Roberts, "The unreasonable effectiveness of quasirandom
-//! sequences", 2018). Then it takes random steps of two kinds. One is differential evolution (R. Storn, K. Price,
-//! Journal of Global Optimization 11, 1997, 341-359). The other is simulated binary crossover with polynomial mutation
-//! (K. Deb, R. B. Agrawal, Complex Systems 9, 1995, 115-148; K. Deb, M. Goyal, Computer Science and Informatics 26,
-//! 1996, 30-45). Limits are handled as by K. Deb (IEEE Transactions on Evolutionary Computation 6, 2002, 182-197): a
+//! sequences", 2018). Then it takes random steps of three kinds. One is differential evolution (R. Storn, K. Price,
+//! Journal of Global Optimization 11, 1997, 341-359). One is simulated binary crossover with polynomial mutation (K.
+//! Deb, R. B. Agrawal, Complex Systems 9, 1995, 115-148; K. Deb, M. Goyal, Computer Science and Informatics 26, 1996,
+//! 30-45). Once there is a front, half of the steps are differential evolution among near points of it (H. Li, Q. Zhang,
+//! IEEE Transactions on Evolutionary Computation 13, 2009, 284-302). Limits are handled as by K. Deb (IEEE Transactions on Evolutionary Computation 6, 2002, 182-197): a
 //! feasible point beats an infeasible one, and the smaller violation beats the larger one. An archive keeps the
 //! non-dominated points, and most steps start there. Each kind of step alone finds less in as many steps
 //! (benches/results/searches.md).
@@ -24,6 +25,10 @@ pub(crate) const MOST_OF_FRONT: usize = 100;
 
 /// Fraction of the steps that start in the archive, if it has points.
 const FROM_ARCHIVE: f64 = 0.9;
+
+/// Number of near points of the archive among which a step takes its difference, and the fraction of such steps.
+const NEAR: usize = 16;
+const AMONG_NEAR: f64 = 0.5;
 
 /// Fraction of the steps for a relaxed limit that start at its best point.
 const FROM_BEST: f64 = 0.5;
@@ -158,6 +163,9 @@ impl Optimiser {
     }
 
     fn offspring(&mut self) -> Vec<f64> {
+        if self.archive.points().len() >= NEAR && self.stream.share() < AMONG_NEAR {
+            return self.differed_among_near();
+        }
         let target = self.stream.below(self.members().len());
         self.parent = Some(target);
         // A limit's own population gets few steps, and differential evolution varies more.
@@ -202,11 +210,8 @@ impl Optimiser {
     fn differed(&mut self, target: usize) -> Vec<f64> {
         let count = self.members().len();
         let base = self.begin();
-        let (one, other) = (self.stream.below(count), self.stream.below(count));
-        let from_archive = self.archive.points().len() > 8 && self.stream.share() < 0.5;
-        let archive = if from_archive { self.archive.points() } else { &[] };
-        let place = |index: usize| archive.get(index).unwrap_or(&self.members()[index]).place.clone();
-        let (one, other) = (place(one), place(other));
+        let two = [self.stream.below(count), self.stream.below(count)];
+        let [one, other] = two.map(|index| self.members()[index].place.clone());
         let scale = 0.1 + 0.8 * self.stream.share();
         let crossing = if self.stream.share() < 0.5 { 0.9 } else { 0.3 };
         let forced = self.stream.below(self.plan.dimensions);
@@ -229,6 +234,21 @@ impl Optimiser {
             child[forced] = self.stream.share();
         }
         child
+    }
+
+    /// Differential evolution along the front: a point of the archive plus a scaled difference of two near it. Such
+    /// differences shrink with the gaps of the front, and mostly stay at one combination of whole numbers.
+    fn differed_among_near(&mut self) -> Vec<f64> {
+        let archive = self.archive.points();
+        let base = &archive[self.stream.below(archive.len())].place;
+        let distance = |place: &[f64]| place.iter().zip(base).map(|(one, other)| (one - other).powi(2)).sum::<f64>();
+        let mut near: Vec<_> = archive.iter().map(|point| (distance(&point.place), &point.place)).collect();
+        near.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let one = self.stream.below(NEAR);
+        let other = (one + 1 + self.stream.below(NEAR - 1)) % NEAR;
+        let scale = 0.1 + 0.8 * self.stream.share();
+        let difference = near[one].1.iter().zip(near[other].1).map(|(one, other)| scale * (one - other));
+        base.iter().zip(difference).map(|(at, difference)| (at + difference).clamp(0.0, 1.0)).collect()
     }
 
     /// Receives the evaluation of the last proposed point, or none if it is impossible.
@@ -333,7 +353,7 @@ pub fn merged(fronts: impl IntoIterator<Item = Point>) -> Vec<Point> {
 
 #[cfg(test)]
 mod tests {
-    use super::{CROSSOVER_INDEX, MUTATION_INDEX, Optimiser, Plan, offset, spread};
+    use super::{CROSSOVER_INDEX, MUTATION_INDEX, NEAR, Optimiser, Plan, offset, spread};
     use crate::point::{Judged, Point};
 
     /// Density of the spread by Deb and Agrawal: `(η + 1) β^η / 2` below 1, and `(η + 1) / (2 β^(η + 2))` above.
@@ -358,6 +378,20 @@ mod tests {
             assert!((offset(share) + offset(1.0 - share)).abs() < 1e-12);
             assert!((0.5 * (1.0 + offset(share)).powf(MUTATION_INDEX + 1.0) - share).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn differences_of_near_points_keep_whole_number() {
+        let plan = Plan { dimensions: 2, limits: 0, scan_from: 0, scan: 0, evaluations: u64::MAX };
+        let mut optimiser = Optimiser::new(plan, Vec::new(), 9, 0);
+        for index in 0..2 * NEAR {
+            let place = vec![if index < NEAR { 0.25 } else { 0.75 }, index as f64 / (4 * NEAR) as f64];
+            let judged = Judged { objectives: vec![place[1], -place[1]], violations: Vec::new() };
+            optimiser.tell(Some(Point { place, judged, values: Vec::new() }));
+        }
+        let children: Vec<_> = (0..1000).map(|_| optimiser.differed_among_near()).collect();
+        assert!(children.iter().all(|child| ((child[0] - 0.5).abs() - 0.25).abs() < 1e-15));
+        assert!(children.iter().any(|child| child[1] > 0.5));
     }
 
     /// If all points lie on one face of the cube, children lie there too, except for mutations.
