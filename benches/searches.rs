@@ -1,5 +1,5 @@
 //! How near searches come to fronts and relaxations that are known by other means: `cargo bench --bench searches` prints shares and needs as
-//! JSON; with a name only those that have it in theirs. `benches/searches.json` has those of the optimiser alone.
+//! JSON; with a name only those that have it in theirs. `benches/searches.json` has those of ten seeds.
 //!
 //! The truth comes from the closed forms of docs/explanation/theory.md (sections 2.1, 2.5 and 7) on a dense grid, that of stresses from the solver on a
 //! grid of shapes, and none of it from the search.
