@@ -205,7 +205,7 @@ impl CheckedSweep {
 
     fn losses_along(&self, totals: LossTotals) -> LossTotals {
         match &self.fingers {
-            Some(fingers) => fingers.losses_along(totals),
+            Some(fingers) => fingers::losses_along(fingers, totals),
             None => totals,
         }
     }
@@ -316,12 +316,13 @@ impl Question for Sweep {
     fn is_short(checked: &CheckedSweep) -> bool {
         /// Solving and writing them takes about 0.1 ms; with Palmgren's law and all options 0.25 ms.
         const FEW_STATES: u64 = 400;
-        let CheckedSweep { drive, deviations, losses, points, with_gaps, with_wind_up, .. } = checked;
+        let CheckedSweep { drive, deviations, fingers, losses, points, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
         // The boundary elements of a tooth take longer than any short sweep, and so does the backlash.
         let is_plain = !with_gaps
             && !with_wind_up
             && losses.is_none()
+            && !fingers.is_some_and(|fingers| fingers.limits_fall_with_torque())
             && !load.parameters().ring_teeth_bend
             && !load.presses_corners(drive);
         match points {

@@ -7,14 +7,13 @@ mod overhang;
 mod strength;
 
 pub use beam::{FOOT_IN_DISC, FingerBeam, Fingers};
-pub use capacity::{Limited, LimitedBy};
+pub use capacity::Limited;
 pub use overhang::{Overhang, slice_compliance_mm2_per_n};
 pub use strength::{LoadCycle, Safety, Strength, stress_concentration};
 
 use crate::contact::{Contact, HertzLine, PerContact};
 use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::LoadParameters;
-use crate::losses::duty::LossTotals;
 use crate::root::NotConverged;
 use crate::sweep::{ContactPeaks, States, SweepPeaks};
 use crate::tooth::flat::FlatContact;
@@ -65,7 +64,10 @@ pub struct CarrierFingers {
 /// Stress of the slot's contact for a force, before an uneven load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum SlotStress {
-    Line { hertz: HertzLine, curvature_per_mm: f64 },
+    Line {
+        hertz: HertzLine,
+        curvature_per_mm: f64,
+    },
     /// A flat that the wall supports over its whole length.
     Flat(FlatContact),
 }
@@ -198,7 +200,7 @@ impl CarrierFingers {
 
     /// Returns the factor of a contact's stress at the most loaded place along the teeth. The stress of a line grows
     /// with the root of its load per length, that of a flat with the load itself.
-    pub(crate) fn stress_factor(&self, contact: Contact) -> f64 {
+    pub fn stress_factor(&self, contact: Contact) -> f64 {
         let peak_over_mean = self.load_peak_over_mean();
         match (contact, &self.slot) {
             (Contact::Carrier, SlotStress::Flat(_)) => peak_over_mean,
@@ -234,19 +236,6 @@ impl CarrierFingers {
             states.stress_mpa.get_mut(contact).iter_mut().for_each(|stress_mpa| *stress_mpa *= factor);
         }
         states
-    }
-
-    /// Returns losses with pressure and wear at the most loaded place along the teeth.
-    pub fn losses_along(&self, mut totals: LossTotals) -> LossTotals {
-        for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
-            if let Some(products) = &mut totals.pressure_velocity_mpa_m_per_s {
-                products.get_mut(contact).value *= self.stress_factor(contact);
-            }
-            if let Some(worn) = &mut totals.wear_mm_per_hour {
-                worn.get_mut(contact).value *= self.load_peak_over_mean();
-            }
-        }
-        totals
     }
 }
 

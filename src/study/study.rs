@@ -129,6 +129,10 @@ impl Study {
     /// # Errors
     /// The same as [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
+        let document = &match document {
+            StudyDocument::Search(search) => StudyDocument::Search(search.with_default_limits()),
+            StudyDocument::Map(_) | StudyDocument::Sensitivity(_) | StudyDocument::Tolerance(_) => document.clone(),
+        };
         let mut study = Self::unnamed(document, limits)?;
         let inputs = if let Kind::Sensitivity(sensitivity) = &study.kind { Some(sensitivity.asked()) } else { None };
         study.id = identity::id(document, &study.template, &study.evaluator.quantities, inputs, &limits.calculation)?;

@@ -1123,6 +1123,7 @@ const OTHER_REPORTS = {
     model: { compatibility: 'projection' },
   },
   slender_fingers: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { carrier: { fingers: 'held_at_one_end' } } },
+  finger_overstressed: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { carrier: { fingers: 'held_at_one_end', strength: 'c45-n', finger_fillet_radius_mm: 0.1 } } },
   soft_rim: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { ring: { rim: 'free' } } },
   projection_with_gap: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { compatibility: 'projection' }, parts: { ring: { clearance_um: 10 } } },
   deprecated_field: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { wave_generator_moves: false } },

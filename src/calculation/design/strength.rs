@@ -60,12 +60,9 @@ impl StrengthDocument {
 impl From<&StrengthDocument> for Strength {
     fn from(document: &StrengthDocument) -> Self {
         let (yield_mpa, tensile_mpa, endurance_mpa, is_hardened) = match document {
-            StrengthDocument::Named(preset) => (
-                preset.yield_strength_mpa,
-                preset.tensile_strength_mpa,
-                preset.endurance_limit_mpa,
-                preset.hardened,
-            ),
+            StrengthDocument::Named(preset) => {
+                (preset.yield_strength_mpa, preset.tensile_strength_mpa, preset.endurance_limit_mpa, preset.hardened)
+            }
             StrengthDocument::Given(numbers) => (
                 numbers.yield_strength_mpa,
                 numbers.tensile_strength_mpa,

@@ -3,7 +3,9 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
+use toothwave_solver::Contact;
 use toothwave_solver::fingers::{CarrierFingers, FingerStress, Fingers, Safety};
+use toothwave_solver::losses::duty::LossTotals;
 use utoipa::ToSchema;
 
 use crate::json::word;
@@ -72,4 +74,17 @@ impl FingersAnswer {
         }
         Ok(())
     }
+}
+
+/// Returns losses with pressure and wear at the most loaded place along the teeth.
+pub(super) fn losses_along(fingers: &CarrierFingers, mut totals: LossTotals) -> LossTotals {
+    for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
+        if let Some(products) = &mut totals.pressure_velocity_mpa_m_per_s {
+            products.get_mut(contact).value *= fingers.stress_factor(contact);
+        }
+        if let Some(worn) = &mut totals.wear_mm_per_hour {
+            worn.get_mut(contact).value *= fingers.load_peak_over_mean();
+        }
+    }
+    totals
 }

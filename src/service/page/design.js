@@ -7,6 +7,8 @@
 // starts with its `start`, a value or what makes one of the design, where the document has none; a field's `preset` is what the service
 // takes where nothing is given. What another kind changes beside itself, `adjust` does.
 
+import { STRENGTHS } from './strengths.js';
+
 /** Shares of the value on either side that a slider spans. */
 const NARROW = 0.05;
 const WIDE = 0.75;
@@ -360,6 +362,10 @@ export const GROUPS = [
         likely: USUAL_SPEED_RPM,
         when: (design) => at(design, '/load/duty') === undefined,
       }),
+      unlessSaid('/load/cycle', 'Load on the carrier’s fingers', [
+        { value: 'pulsating', label: 'pulsating: one sense of the torque' },
+        { value: 'reversed', label: 'reversed: both senses' },
+      ]),
       number('/load/allowable_stress_mpa', 'Allowable stress', 'σ', 'MPa', { slider: WIDE, optional: (design) => (at(design, '/load/allowable_stress_mpa') === undefined ? 'not asked' : 'by contact') }),
     ],
   },
@@ -484,7 +490,7 @@ export const GROUPS = [
   {
     title: 'Parts as they are made',
     pointer: '/parts',
-    hint: 'Drawings read these, and what is estimated to give way behind the contacts; forces on flat-sided teeth read the carrier’s radii too.',
+    hint: 'Drawings, the strength of the carrier’s fingers and the estimates of what gives way behind the contacts depend on these; forces on flat-sided teeth depend on the carrier’s radii too.',
     summary: (design) => {
       const given = Object.values(at(design, '/parts') ?? {}).flatMap((part) => Object.values(part ?? {})).filter((value) => value !== null);
       return given.length === 0 ? 'defaults' : `${given.length} given`;
@@ -514,8 +520,12 @@ export const GROUPS = [
           freeRadius('carrier', 'Carrier', 'outer_radius', 'Outer radius', 'R_o', 'tenth free'),
           unlessSaid('/parts/carrier/fingers', 'Its fingers are held', [
             { value: 'held_at_both_ends', label: 'at both ends' },
+            { value: 'far_ends_joined', label: 'at one end, far ends joined by a ring' },
             { value: 'held_at_one_end', label: 'at one end' },
+            { value: 'web_in_the_middle', label: 'by a web in the middle' },
           ]),
+          number('/parts/carrier/finger_fillet_radius_mm', 'Fillet at their feet', 'r_f', 'mm', { optional: () => 'tenth of thickness', step: 0.1 }),
+          unlessSaid('/parts/carrier/strength', 'Strength of its material', STRENGTHS),
         ],
       },
     ],

@@ -129,11 +129,18 @@ const KINDS = {
     basis: ['ISO 281:2007', 'The limit is that of ISO 281:2007, up to which its equation for the life holds.'],
     why: 'Under more than that its parts give way for good, and it may last less long than calculated. A static load rating below half the dynamic one is a limit of its own, which nothing here knows.',
   },
+  finger_overstressed: {
+    title: 'Fingers of the carrier too weak',
+    tests: 'The safety of a finger against yield and fatigue at its foot, against 1.',
+    basis: ['as given', 'The strength is that of this design’s carrier; the notch is that of Roark’s formulas.'],
+    why: 'A finger that yields or cracks lets its tooth go, and its neighbours take the load.',
+    change: 'Stress grows with the length of the teeth and falls with the square of the thickness.',
+  },
   stress_above_allowable: {
     title: 'Stress above the allowable one',
     tests: 'The peak contact stress over a period against the one that the contact may have.',
     basis: ['as given', 'The limit is the allowable stress of this design.'],
-    why: 'The torque capacity is the torque at which the first contact reaches its own.',
+    why: 'The torque capacity is the torque at which a contact reaches its own, or a finger its strength.',
     change: 'Stress grows about with the square root of the torque, that of balls with its cube root.',
   },
   stress_above_fatigue_limit: {

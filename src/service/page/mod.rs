@@ -84,6 +84,7 @@ const ASSETS: &[Asset] = assets![
     "share.js" as SCRIPT,
     "sight.js" as SCRIPT,
     "states.js" as SCRIPT,
+    "strengths.js" as SCRIPT,
     "studies.js" as SCRIPT,
     "study-view.js" as SCRIPT,
     "terms.js" as SCRIPT,

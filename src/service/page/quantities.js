@@ -27,7 +27,7 @@ const PHRASES = [
 
 const GROUPS = [
   { title: 'Geometry', needs: ['drive'] },
-  { title: 'Under load', needs: ['load', 'allowable_stress'] },
+  { title: 'Under load', needs: ['load', 'allowable_stress', 'carrier_strength'] },
   { title: 'Friction', needs: ['friction', 'friction_and_speed'] },
 ];
 
@@ -36,6 +36,7 @@ const HAS = {
   drive: () => true,
   load: (design) => at(design, '/load') !== undefined,
   allowable_stress: (design) => at(design, '/load/allowable_stress_mpa') !== undefined,
+  carrier_strength: (design) => at(design, '/load') !== undefined && at(design, '/parts/carrier/strength') !== undefined,
   friction: (design) => at(design, '/load') !== undefined && at(design, '/friction') !== undefined,
   friction_and_speed: (design) => at(design, '/friction') !== undefined && (at(design, '/load/input_speed_rpm') ?? at(design, '/load/duty')) !== undefined,
 };

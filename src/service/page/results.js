@@ -122,6 +122,8 @@ const BACKINGS = {
   free_rim: 'Rim with nothing around it',
   finger_at_both_ends: 'Finger held at both ends',
   finger_at_one_end: 'Finger held at one end',
+  finger_joined_at_far_end: 'Finger joined at its far end',
+  finger_on_web: 'Finger on a web in its middle',
 };
 
 /** What parts behind the contacts are estimated to give way, to be taken over as series compliance. */
@@ -146,6 +148,38 @@ const backlashRows = [
   backlashRow('Most backlash of the output', ({ largest_arcmin: largest }) => largest),
   ...CONTACTS.map(({ key, name }) => backlashRow(`Backlash by ${name.toLowerCase()}`, ({ contribution_arcmin: part }) => part[key])),
 ];
+
+const LIMITS = {
+  wave_generator: 'contact at the wave generator',
+  ring: 'contact at the ring',
+  carrier: 'contact at the slots',
+  finger_yield: 'yield of the carrier’s fingers',
+  finger_fatigue: 'fatigue of the carrier’s fingers',
+};
+
+const limitOf = ({ sweep: { torque_capacity: capacity } }) => (capacity.turns_past_teeth ? 'turning past the teeth' : LIMITS[capacity.limited_by]);
+
+const HOLDINGS = {
+  held_at_one_end: 'held at one end',
+  held_at_both_ends: 'held at both ends',
+  far_ends_joined: 'far ends joined',
+  web_in_the_middle: 'on a web in the middle',
+};
+
+const heldOf = ({ sweep: { fingers } }) => `${HOLDINGS[fingers.fingers]}${fingers.is_assumed ? ', assumed' : ''}`;
+
+const safetyTile = {
+  ...row('Safety of the fingers', '', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
+  note: heldOf,
+  state: ({ sweep }) => (sweep.fingers.safety < 1 ? 'warning' : ''),
+  isOptional: true,
+};
+
+const capacityTile = {
+  ...row('Torque capacity', '', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { significant: 4 }),
+  note: (answers) => `output; limited by ${limitOf(answers)}`,
+  isOptional: true,
+};
 
 const backlashTile = {
   ...backlashRow('Mean backlash', ({ mean_arcmin: mean }) => mean),
@@ -172,6 +206,8 @@ const KEY_ROWS = [
     note: ({ sweep: { losses } }) => (losses.self_locking ? 'ring fixed; locks itself' : `ring fixed; ${number(100 * losses.efficiency.ring_fixed_back_driven, 3)} % from behind`),
     isOptional: true,
   }),
+  capacityTile,
+  safetyTile,
   backlashTile,
   row('Undercut', '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
     text: ({ geometry }) => (geometry.undercut.occurs ? 'yes' : 'no'),
@@ -190,17 +226,27 @@ export const GROUPS = [
   },
   {
     title: 'Torque capacity at the allowable stress',
+    told: ({ sweep }) => (sweep?.torque_capacity && sweep.fingers && sweep.fingers.safety === undefined ? 'Contacts alone: give the strength of the carrier’s material to include its fingers.' : ''),
     offer: '/load/allowable_stress_mpa',
     rows: [
       row('Input torque', 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
       row('Output torque', 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm),
       row('Limited by', '', '', ({ sweep }) => sweep?.torque_capacity?.limited_by, {
-        text: ({ sweep }) =>
-          sweep.torque_capacity.turns_past_teeth
-            ? 'turning past the teeth'
-            : CONTACTS.find(({ key }) => key === sweep.torque_capacity.limited_by).name.toLowerCase(),
+        text: limitOf,
       }),
       row('At the input angle', 'j', 'deg', ({ sweep }) => sweep?.torque_capacity?.input_angle_deg),
+    ],
+  },
+  {
+    title: 'Strength of the carrier’s fingers',
+    offer: '/parts/carrier/strength',
+    rows: [
+      row('Safety', 'S', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
+      row('Safety against yield', 'S_F', '', ({ sweep }) => sweep?.fingers?.yield_safety, { significant: 3 }),
+      row('Safety against fatigue', 'S_D', '', ({ sweep }) => sweep?.fingers?.fatigue_safety, { significant: 3 }),
+      row('Largest stress at the foot', 'σ', 'MPa', ({ sweep }) => sweep?.fingers?.stress_mpa, { significant: 4 }),
+      row('Support', '', '', ({ sweep }) => sweep?.fingers?.stress_mpa, { text: heldOf }),
+      row('Load along a tooth, largest over mean', 'κ', '', ({ sweep }) => sweep?.fingers?.load_peak_over_mean, { significant: 3 }),
     ],
   },
   {

@@ -1,37 +1,11 @@
 //! Torque capacity of a drive with its carrier's fingers (docs/explanation/theory.md section 4.7).
 
 use crate::SolveError;
-use crate::contact::{Contact, PerContact};
+use crate::contact::PerContact;
 use crate::fingers::{CarrierFingers, Strength};
 use crate::load_sharing::LoadCase;
 use crate::root::NotConverged;
-use crate::sweep::{Sweep, SweepPeaks, TorqueCapacity};
-
-/// What limits the torque capacity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
-pub enum LimitedBy {
-    /// The contact stress at the wave generator.
-    WaveGenerator,
-    /// The contact stress at the ring.
-    Ring,
-    /// The contact stress at the slots of the carrier.
-    Carrier,
-    /// Yield of the carrier's fingers.
-    FingerYield,
-    /// Fatigue of the carrier's fingers.
-    FingerFatigue,
-}
-
-impl From<Contact> for LimitedBy {
-    fn from(contact: Contact) -> Self {
-        match contact {
-            Contact::WaveGenerator => Self::WaveGenerator,
-            Contact::Ring => Self::Ring,
-            Contact::Carrier => Self::Carrier,
-        }
-    }
-}
+use crate::sweep::{LimitedBy, Sweep, SweepPeaks, TorqueCapacity};
 
 /// Result of a sweep with a torque capacity.
 pub trait Limited {
@@ -89,7 +63,7 @@ impl CarrierFingers {
             Ok::<_, SolveError>((swept, torque_nm))
         };
         let (swept, most_nm) = under(0.0)?;
-        if self.moment_nmm_per_nm <= 0.0 || self.parameters.strength.is_none() {
+        if !self.limits_fall_with_torque() {
             return Ok(swept);
         }
         // With the torque the moment that is left for the tooth's force becomes less: the capacity is the torque under
@@ -109,6 +83,11 @@ impl CarrierFingers {
             bracket_width: bracket.high_nm - bracket.low_nm,
         }
         .into())
+    }
+
+    /// Returns true if the force that a finger bears falls with the torque, so that a capacity takes several sweeps.
+    pub fn limits_fall_with_torque(&self) -> bool {
+        self.moment_nmm_per_nm > 0.0 && self.parameters.strength.is_some()
     }
 
     /// Returns the stress of the slot's contact under the largest force that a finger bears beside the torque.

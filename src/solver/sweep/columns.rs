@@ -3,11 +3,11 @@
 use crate::SolveError;
 use crate::contact::{Contact, Materials, PerContact, SHEAR_DEPTH, SHEAR_SHARE, half_width_mm};
 use crate::drive::Drive;
-use crate::fingers::LimitedBy;
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::{Mesh, TeethInMesh};
 use crate::root::NotConverged;
 use crate::springs::WindUp;
+use crate::sweep::limited_by::LimitedBy;
 use crate::sweep::points::Points;
 use crate::tooth::point::ShearBelow;
 use crate::tooth::{Pressure, StressExponents};
