@@ -30,8 +30,9 @@ import { Tolerance } from './tolerance.js';
 import { Toolbar } from './toolbar.js';
 import { Views } from './views.js';
 
-/** The page opens on the drive of this example, calculated by the default model. */
+/** The page opens on the drive of this example, calculated by the default model, and tells what limits its torque if it is of steel. */
 const FIRST_DRIVE = 'paper-5.1';
+const STEEL_LIMITS = { allowable_stress_mpa: 1500, strength: '42crmo4-qt' };
 /** Degrees of the input angle per second while it plays: a turn takes 20 seconds. */
 const PLAY_SPEED = 18;
 const MOST_TURNS = 3;
@@ -786,7 +787,9 @@ async function loadExamples() {
   const { examples } = await getJson('v1/examples');
   const loaded = await Promise.all(examples.map(async ({ name, title, href }) => ({ name, title, design: await getJson(href.slice(1)) })));
   const { drive, load } = (loaded.find(({ name }) => name === FIRST_DRIVE) ?? loaded[0]).design;
-  return [{ name: 'first', title: 'First design: an ellipse with 28 rollers, default model', design: { drive, load } }, ...loaded];
+  const { allowable_stress_mpa, strength } = STEEL_LIMITS;
+  const design = { drive, load: { ...load, allowable_stress_mpa }, parts: { carrier: { strength } } };
+  return [{ name: 'first', title: 'First design: an ellipse with 28 rollers, default model', design }, ...loaded];
 }
 
 function showExamples() {
