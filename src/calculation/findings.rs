@@ -102,7 +102,7 @@ impl Text {
                 "mm",
                 if is_grave {
                     format!(
-                        "the ring's tooth tips are cut away by their own envelope: teeth start to touch the flank only {starts_deg:.4} deg from {lobe}, fewer of them mesh, and loads jump when one enters unless corners carry"
+                        "the moving teeth cut away the tips of the ring's teeth: they start to touch the flank only {starts_deg:.4} deg from {lobe}, fewer of them mesh, and loads jump when one enters unless corners carry"
                     )
                 } else {
                     "the ring's tooth tips would be undercut, but the bore takes more away than undercut does".into()

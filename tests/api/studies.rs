@@ -29,7 +29,10 @@ fn long() -> Value {
 
 /// Returns a study with this many variants, each slower than any test.
 fn slow(steps: u64) -> Value {
-    map(&with(&shortest(), "/sweep", json!({ "samples": 10_000_000 })), steps)
+    let mut document = with(&shortest(), "/sweep", json!({ "samples": 10_000_000 }));
+    document["parts"] = json!({ "ring": { "clearance_um": 10.0 } });
+    document["model"] = json!({ "refinements": ["wave_generator_moves"] });
+    map(&document, steps)
 }
 
 async fn start_study(service: &Service, study: &Value) -> Answer {

@@ -58,7 +58,7 @@ class Document:
     def rows(self, schema, path, is_required=False):
         """One row for each field below: (path, schema, is_required)."""
         schema = self.resolved(schema)
-        if word := schema.get("discriminator", {}).get("propertyName"):
+        if word := self.word_of_choice(schema):
             yield from self.union(path, word, schema)
             return
         if "properties" not in schema:
@@ -71,12 +71,21 @@ class Document:
                 field = {**field, "parent": schema.get("description", "")}
                 yield from self.rows(field, f"{at}/{name}", name in inner.get("required", []))
 
+    def word_of_choice(self, schema):
+        """The field that tells the variants of a choice apart."""
+        first, *others = [self.resolved(variant).get("properties", {}) for variant in schema.get("oneOf", [])] or [{}]
+        return next((name for name, field in first.items() if len(field.get("enum", [])) == 1 and all(name in other for other in others)), None)
+
     def union(self, path, word, schema):
-        """The fields of all variants. The variant that needs no word is the default."""
+        """The fields of all variants. The variant that may leave out the word, or has none, is the default."""
         variants = [self.resolved(variant) for variant in schema["oneOf"]]
         named = {variant["properties"][word]["enum"][0]: variant for variant in variants if word in variant["properties"]}
         bare = [set(variant["properties"]) for variant in variants if word not in variant["properties"]]
-        default = [name for name, variant in named.items() if set(variant["properties"]) - {word} in bare]
+        default = [
+            name
+            for name, variant in named.items()
+            if "default" in variant["properties"][word] or set(variant["properties"]) - {word} in bare
+        ]
         texts = " ".join(f"`{name}`: {first_sentence(variant['description'])}." for name, variant in named.items())
         row = {"description": f"{schema['description']} {texts}", "enum": list(named)}
         yield f"{path}/{word}", {**row, "default": default[0]} if default else row, not default and "left out" not in schema["description"]
@@ -84,8 +93,9 @@ class Document:
         for name, variant in named.items():
             for field, below in variant["properties"].items():
                 if field != word:
-                    fields.setdefault(field, []).append((name, variant, {"parent": variant["description"], **below}))
-        for field, places in fields.items():
+                    same = field, below.get("minimum")
+                    fields.setdefault(same, []).append((name, variant, {"parent": variant["description"], **below}))
+        for (field, _), places in fields.items():
             needed = [name for name, variant, _ in places if field in variant.get("required", [])]
             names = ", ".join(f"`{name}`" for name in needed)
             needed = f"required by {names}" if 0 < len(needed) < len(places) else bool(needed)
@@ -168,8 +178,8 @@ def design_document(document):
         "# Design document",
         WRITTEN,
         "One JSON document describes a drive and what is asked of it. Each endpoint reads only what it needs.\n"
-        "A field that is not listed here gets 422 `unknown_field`. An empty default means that nothing is computed from the field, or that "
-        "its meaning says what is taken. An entry of a list is written as `/0`. Fields that differ by the part alone share a line.",
+        "A field that is not listed here gets 422 `unknown_field`. If the column of defaults is empty, the meaning says what is taken instead. "
+        "If it does not, the field is not used. An entry of a list is written as `/0`. Fields that differ by the part alone share a line.",
     ]
     for name, note in SECTIONS.items():
         rows = [["field", "unit", "allowed", "default", "meaning"]]
