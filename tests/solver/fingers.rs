@@ -294,7 +294,7 @@ fn elastic_disc_and_radial_bending_add_measured_compliance() {
             beam.compliance_mm_per_n(&Material::STEEL, fingers) / rigid.compliance_mm_per_n(&Material::STEEL, fingers)
         };
         let (one, both) = (more(Fingers::HeldAtOneEnd), more(Fingers::HeldAtBothEnds));
-        assert!((1.28..1.9).contains(&one) && (1.3..1.9).contains(&both), "{one}, {both}");
+        assert!((1.28..1.9).contains(&one) && (1.25..1.9).contains(&both), "{one}, {both}");
     }
 }
 
