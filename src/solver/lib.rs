@@ -74,6 +74,7 @@ pub mod contact_law;
 pub mod drawing;
 pub mod drive;
 pub mod findings;
+pub mod fingers;
 pub mod gaps;
 pub mod load_sharing;
 pub mod locus;

@@ -8,6 +8,7 @@ mod tooth_state;
 
 #[doc(hidden)]
 pub use capacity::{LawEnd, TorqueLimit};
+pub(crate) use equilibrium::{curvature_per_mm, force_ratio};
 pub use load::{Compatibility, LoadCase, LoadParameters, Torque};
 #[doc(hidden)]
 pub use loaded_drive::LoadedDrive;

@@ -39,6 +39,8 @@ pub enum Needs {
     Load,
     /// A load and `load.allowable_stress_mpa`.
     AllowableStress,
+    /// A load and `parts.carrier.strength`.
+    CarrierStrength,
     /// A load and `friction`.
     Friction,
     /// A load, `friction` and a speed: `load.input_speed_rpm`, or the speeds of a `load.duty`.

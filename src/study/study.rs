@@ -131,6 +131,13 @@ impl Study {
     /// # Errors
     /// The same as [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
+        let limited;
+        let document = if let StudyDocument::Search(search) = document {
+            limited = StudyDocument::Search(search.with_default_limits());
+            &limited
+        } else {
+            document
+        };
         let mut study = Self::unnamed(document, limits)?;
         let resolved = match &study.kind {
             Kind::Map(map) => vec![("over", Tree::Array(vec![study.template.asked(), map.counts()]))],

@@ -39,13 +39,16 @@ impl SweepAnswer {
             let limit = if capacity.turns_past_teeth {
                 "beyond it the wave generator turns past its teeth".to_owned()
             } else {
-                format!("limited by {}", word(&capacity.contact))
+                format!("limited by {}", word(&capacity.limited_by).replace('_', " "))
             };
             writeln!(
                 writer,
                 "\ntorque capacity, input and output   {:.6} and {:.6} N·m, {limit} at {:.4} deg",
                 capacity.input_torque_nm, capacity.output_torque_nm, capacity.input_angle_deg
             )?;
+        }
+        if let Some(fingers) = &self.fingers {
+            fingers.write_text(writer)?;
         }
         if let Some(wind_up) = &self.wind_up {
             let range = |column: &[f64]| {

@@ -3,6 +3,7 @@
 use super::load::Compatibility;
 use crate::cam::ToothCenter;
 use crate::contact::PerContact;
+use crate::drive::Drive;
 use crate::ring::{FlankPoint, RingFlank};
 
 /// Contribution of each contact's approach to the displacement ξ along `F_H`.
@@ -30,7 +31,7 @@ impl Weights {
 }
 
 /// Forces over `F_H`: 1, `F_K/F_H = cos γ/cos β`, `F_S/F_H = sin γ Z_G/U` \[1\], where `Z_G/U = k + s`.
-pub(super) fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContact<f64> {
+pub(crate) fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContact<f64> {
     let t = center.tan_pressure_angle;
     let tan_ring = flank.teeth_per_wave() * t;
     let cos_cam = 1.0 / (1.0 + t * t).sqrt();
@@ -38,6 +39,16 @@ pub(super) fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -
         wave_generator: 1.0,
         ring: (1.0 + tan_ring * tan_ring).sqrt() * cos_cam,
         carrier: t * cos_cam * (flank.teeth_per_wave() + sense),
+    }
+}
+
+/// Returns the relative curvature of each contact of a tooth in the plane of motion.
+pub(crate) fn curvature_per_mm(drive: &Drive, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
+    let r = drive.parameters().tooth_radius_mm;
+    PerContact {
+        wave_generator: 1.0 / r + center.cam_contact.curvature_per_mm,
+        ring: 1.0 / (r * flank.regularity),
+        carrier: 1.0 / r,
     }
 }
 

@@ -195,6 +195,11 @@ impl LoadCase {
         if violations.is_empty() { Ok(Self(*parameters)) } else { Err(violations) }
     }
 
+    /// Returns the load with other allowable stresses of the contacts.
+    pub(crate) fn with_allowable_stress(&self, stress_mpa: PerContact<f64>) -> Self {
+        Self(LoadParameters { allowable_stress_mpa: Some(stress_mpa), ..self.0 })
+    }
+
     /// Returns the parameters, as given.
     pub const fn parameters(&self) -> &LoadParameters {
         &self.0

@@ -1,6 +1,6 @@
 //! State of a tooth at a position: geometry, gaps, pressure models, spring.
 
-use super::equilibrium::{Weights, force_ratio, force_ratio_at_corner};
+use super::equilibrium::{Weights, curvature_per_mm, force_ratio, force_ratio_at_corner};
 use super::load::Compatibility;
 use super::loaded_drive::LoadedDrive;
 use crate::cam::ToothCenter;
@@ -51,7 +51,7 @@ impl<'a> LoadedDrive<'a> {
         position: Position,
     ) -> Result<(ToothCenter, PerContact<f64>), NotConverged> {
         let center = self.drive.flank().locus().at(position)?;
-        Ok((center, self.curvature_per_mm(&center, &self.drive.flank().at(&center))))
+        Ok((center, curvature_per_mm(self.drive, &center, &self.drive.flank().at(&center))))
     }
 
     /// Returns the pressure model of a contact of a tooth at a position.
@@ -91,7 +91,7 @@ impl<'a> LoadedDrive<'a> {
             Some(_) => force_ratio,
             None => Weights::of(self.compatibility, sense, flank_curve, &center).0,
         };
-        let curvature_per_mm = self.curvature_per_mm(&center, &flank);
+        let curvature_per_mm = curvature_per_mm(self.drive, &center, &flank);
         let places = PerContact::try_of(|contact| {
             Ok::<_, SolveError>(tooth::Place {
                 force_ratio: *force_ratio.get(contact),
@@ -174,16 +174,6 @@ impl<'a> LoadedDrive<'a> {
         turned_rad * (ring_arm_mm - of_flank_mm)
     }
 
-    /// Returns the relative curvature of each contact of a tooth in the plane of motion.
-    fn curvature_per_mm(&self, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
-        let r = self.drive.parameters().tooth_radius_mm;
-        PerContact {
-            wave_generator: 1.0 / r + center.cam_contact.curvature_per_mm,
-            ring: 1.0 / (r * flank.regularity),
-            carrier: 1.0 / r,
-        }
-    }
-
     /// Returns the pressure model of a contact of a tooth.
     pub(super) fn pressure(
         &self,
@@ -224,7 +214,7 @@ impl<'a> LoadedDrive<'a> {
         flank: &FlankPoint,
         force_n: &PerContact<f64>,
     ) -> Result<PerContact<f64>, SolveError> {
-        let curvature_per_mm = self.curvature_per_mm(center, flank);
+        let curvature_per_mm = curvature_per_mm(self.drive, center, flank);
         let width_mm = self.drive.tooth_width_mm();
         PerContact::try_of(|contact| {
             let pressure = self.pressure(contact, center, *curvature_per_mm.get(contact))?;

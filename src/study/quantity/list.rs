@@ -6,8 +6,8 @@ use toothwave_solver::mesh::Mesh;
 
 use super::variant::most;
 use super::{
-    OUTER_DIAMETER_MM, Quantity, Source, TRANSMISSION_RATIO, Takes, backlash, efficiency, flag, geometry, loss_ratio,
-    mesh, of_capacity, of_drive, of_losses, of_sweep, pressure_velocity, sweep,
+    Needs, OUTER_DIAMETER_MM, Quantity, Source, TRANSMISSION_RATIO, Takes, backlash, efficiency, flag, geometry,
+    loss_ratio, mesh, of_capacity, of_drive, of_losses, of_sweep, pressure_velocity, sweep,
 };
 
 /// Paths of the numbers of teeth and lobes.
@@ -18,7 +18,7 @@ const COUNTS: [&str; 4] =
 const TORQUE: [&str; 5] = ["/load", COUNTS[0], COUNTS[1], COUNTS[2], COUNTS[3]];
 
 /// All quantities, in the order in which they are listed.
-pub static QUANTITIES: [Quantity; 59] = [
+pub static QUANTITIES: [Quantity; 61] = [
     of_drive(
         TRANSMISSION_RATIO,
         "",
@@ -355,18 +355,37 @@ pub static QUANTITIES: [Quantity; 59] = [
         "",
         "Deflection of a carrier finger over the deflection of a tooth at its contacts. 0 without an estimate. Above 0.2 there is a finding.",
         Source::Definition("the `share` of the finger with its actual support among `/series_compliance_estimates` of the sweep, 0 if it is absent"),
-        |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.peaks.contacts).unwrap_or(0.0))),
+        |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.mean_peaks).unwrap_or(0.0))),
     )
     .not_below_zero(),
+    of_sweep(
+        "finger_stress_mpa",
+        "MPa",
+        "Largest bending stress at the foot of a carrier finger. 0 without a calculation, as for balls.",
+        sweep("/fingers/stress_mpa"),
+        |variant| Ok(variant.fingers(|stress| Some(stress.largest_mpa))),
+    )
+    .not_below_zero(),
+    Quantity {
+        needs: Needs::CarrierStrength,
+        ..of_sweep(
+            "finger_safety",
+            "",
+            "Safety of the carrier fingers against yield and fatigue. Below 1 there is a finding. 0 without a calculation, as for balls.",
+            sweep("/fingers/safety"),
+            |variant| Ok(variant.fingers(|stress| stress.safety.map(|safety| safety.least()))),
+        )
+        .not_below_zero()
+    },
     of_capacity(
         "torque_capacity_input_nm",
-        "Largest torque at the wave generator with which no contact exceeds the allowable stress.",
+        "Largest torque at the wave generator with which no contact exceeds the allowable stress and no finger its strength.",
         sweep("/torque_capacity/input_torque_nm"),
         |variant| Ok(variant.capacity(|input_nm, _| input_nm)),
     ),
     of_capacity(
         "torque_capacity_output_nm",
-        "Largest torque at the carrier with which no contact exceeds the allowable stress.",
+        "Largest torque at the carrier with which no contact exceeds the allowable stress and no finger its strength.",
         sweep("/torque_capacity/output_torque_nm"),
         |variant| Ok(variant.capacity(|_, output_nm| output_nm)),
     ),

@@ -2,6 +2,7 @@
 
 use toothwave_calculation::sweep::CheckedSweep;
 use toothwave_solver::backlash::Backlash;
+use toothwave_solver::fingers::FingerStress;
 use toothwave_solver::losses::duty::LossTotals;
 use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::sweep::{ContactPeaks, Peak, SweepPeaks};
@@ -21,10 +22,20 @@ pub(crate) struct Variant<'a> {
 pub(crate) struct Loaded<'a> {
     pub(crate) checked: &'a CheckedSweep,
     pub(crate) peaks: SweepPeaks,
+    /// Peaks with the stresses that are means along the teeth.
+    pub(crate) mean_peaks: PerContact<ContactPeaks>,
     /// Over all points of a duty; the rest is of its hardest.
     pub(crate) losses: Option<LossTotals>,
     pub(crate) radial_forces: Option<RadialForces>,
     pub(crate) backlash: Option<Backlash>,
+}
+
+impl<'a> Loaded<'a> {
+    /// Builds the results from the peaks of a sweep, whose stresses are means along the teeth.
+    pub(crate) fn new(checked: &'a CheckedSweep, peaks: SweepPeaks, backlash: Option<Backlash>) -> Self {
+        let mean_peaks = peaks.contacts;
+        Self { checked, peaks: checked.summary_along(peaks), mean_peaks, losses: None, radial_forces: None, backlash }
+    }
 }
 
 impl Variant<'_> {
@@ -46,6 +57,11 @@ impl Variant<'_> {
             let capacity = loaded.peaks.torque_capacity.as_ref();
             capacity.map_or(f64::NAN, |capacity| of(capacity.input_torque_nm, capacity.output_torque_nm))
         })
+    }
+
+    /// Returns a value of the carrier's fingers, 0 if they are not calculated.
+    pub(super) fn fingers(&self, of: impl Fn(&FingerStress) -> Option<f64>) -> f64 {
+        self.loaded(|loaded| loaded.checked.finger_stress(&loaded.mean_peaks).as_ref().and_then(&of).unwrap_or(0.0))
     }
 
     pub(super) fn losses(&self, of: impl Fn(&LossTotals) -> f64) -> f64 {

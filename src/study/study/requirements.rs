@@ -45,8 +45,10 @@ pub(super) fn asked_quantities(names: &[String], template: &Template) -> Result<
     if names.is_empty() {
         let has = template.examples().map(what_it_has).min().unwrap_or(Needs::Drive);
         let known = template.examples().all(has_allowable_stress);
+        let has_strength = template.examples().all(has_carrier_strength);
         let is_had = |quantity: &&Quantity| match quantity.needs {
             Needs::AllowableStress => known,
+            Needs::CarrierStrength => has_strength,
             needs => needs <= has,
         };
         return Ok(QUANTITIES.iter().filter(is_had).collect());
@@ -61,6 +63,10 @@ fn at<'a>(tree: &'a Tree, place: &[&str]) -> Option<&'a Tree> {
 
 fn has_allowable_stress(tree: &Tree) -> bool {
     at(tree, &["load", "allowable_stress_mpa"]).is_some()
+}
+
+fn has_carrier_strength(tree: &Tree) -> bool {
+    at(tree, &["load"]).and(at(tree, &["parts", "carrier", "strength"])).is_some()
 }
 
 /// True if the document sets the speed of the wave generator. Every point of a duty does.
@@ -87,6 +93,9 @@ pub(super) fn require_what_quantities_need(quantities: &[&'static Quantity], tre
             Needs::Load => &[(&["load"], "a load")],
             Needs::AllowableStress => {
                 &[(&["load"], "a load"), (&["load", "allowable_stress_mpa"], "an allowable stress")]
+            }
+            Needs::CarrierStrength => {
+                &[(&["load"], "a load"), (&["parts", "carrier", "strength"], "the strength of the carrier")]
             }
             Needs::Friction => &[(&["load"], "a load"), (&["friction"], "friction")],
             Needs::FrictionAndSpeed if has_speed(tree) => &[(&["friction"], "friction")],
