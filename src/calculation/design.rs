@@ -5,6 +5,7 @@
 use serde::{Deserialize, Serialize};
 use toothwave_solver::backing::Support;
 use toothwave_solver::drawing::DrawingParameters;
+use toothwave_solver::fingers::{FingerParameters, LoadCycle};
 use toothwave_solver::losses::duty::LossParameters;
 use toothwave_solver::parts::{CarrierRadii, PartsParameters};
 use toothwave_solver::profile::{Extent, ProfileParameters};
@@ -27,6 +28,7 @@ mod modification;
 mod number;
 mod refinements;
 mod resolved;
+mod strength;
 
 pub use asked::*;
 pub use deviations::*;
@@ -38,6 +40,7 @@ pub use modification::*;
 pub use number::Whole;
 pub use refinements::*;
 pub use resolved::*;
+pub use strength::*;
 
 use drive::Counted;
 use number::given;
@@ -380,6 +383,28 @@ impl Design {
     pub fn support(&self) -> Support {
         let PartsDocument { ring, carrier, .. } = &self.parts;
         Support { fingers: carrier.fingers, rim: ring.rim }
+    }
+
+    /// Returns the parameters of the carrier's fingers.
+    ///
+    /// # Errors
+    /// Every value that is out of its range.
+    pub fn finger_parameters(&self) -> Result<FingerParameters, Vec<Violation>> {
+        let CarrierPartDocument { fingers, finger_fillet_radius_mm, strength, .. } = &self.parts.carrier;
+        let fillet = finger_fillet_radius_mm.map(|radius_mm| (Parameter::FingerFilletRadius, radius_mm));
+        let numbers = strength.iter().flat_map(StrengthDocument::numbers);
+        let violations: Vec<_> =
+            fillet.into_iter().chain(numbers).filter_map(|(parameter, value)| parameter.check(value)).collect();
+        if !violations.is_empty() {
+            return Err(violations);
+        }
+        Ok(FingerParameters {
+            fingers: *fingers,
+            fillet_radius_mm: *finger_fillet_radius_mm,
+            strength: strength.as_ref().map(Into::into),
+            cycle: self.load.as_ref().map_or_else(LoadCycle::default, |load| load.cycle),
+            friction_coefficient: self.friction.as_ref().map_or(0.0, |friction| friction.carrier.coefficient),
+        })
     }
 
     /// Returns the parameters of a drawing.

@@ -206,7 +206,7 @@ impl Text {
                 "",
                 format!(
                     "the carrier's fingers, {}, bend under their teeth: by an estimate they add this share to what a tooth gives way at its contacts, and forces and wind-up leave it out",
-                    if is_grave { "held at one end" } else { "even if held at both ends" }
+                    if is_grave { "held as they are" } else { "even if held at both ends" }
                 ),
                 "give the estimate as the carrier's series compliance, or make the fingers shorter or thicker",
             ),
@@ -347,6 +347,12 @@ impl Text {
                 "N",
                 "the load on the bearing exceeds half its dynamic load rating, the limit of its life equation (ISO 281:2007): its life may be shorter than calculated",
                 "choose a bearing with a larger load rating, or lower the torque",
+            ),
+            Code::FingerOverstressed => text(
+                &["/parts/carrier/strength", "/parts/carrier/fingers", LOAD, WIDTH, RADIUS],
+                "",
+                "the safety of the carrier's fingers is below 1: they yield or break by fatigue at their feet",
+                "lower the torque, hold the fingers at both ends, make them thicker or shorter, or choose a stronger material",
             ),
             Code::StressAboveAllowable => text(
                 &[&["/load/allowable_stress_mpa"], stressed, &[&*mate]].concat(),

@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 use toothwave_solver::backing::{Backings, Shares};
+use toothwave_solver::fingers::{CarrierFingers, FingerStress, Limited};
 use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, LossParameters, LossTotals, PointLosses};
 use toothwave_solver::losses::{Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
@@ -24,6 +25,7 @@ use crate::question::{Limits, Question, checked_drive, checked_load, require_fin
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
+use crate::sweep::fingers::FingersAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer, RollsAnswer};
 
 pub mod answer;
@@ -31,6 +33,7 @@ mod arrow;
 pub mod backing;
 pub mod backlash;
 pub mod duty;
+pub mod fingers;
 pub mod losses;
 mod model_error;
 pub mod peaks_only;
@@ -46,6 +49,7 @@ pub struct CheckedSweep {
     is_duty: bool,
     deviations: Deviations,
     backings: Backings,
+    fingers: Option<CarrierFingers>,
     losses: Option<LossParameters>,
     points: Points,
     with_gaps: bool,
@@ -127,7 +131,7 @@ impl CheckedSweep {
             Some(LossParameters { bearing: Some(_), .. }) => self.radial_forces(hardest, stop)?,
             _ => None,
         };
-        Ok(self.losses(hardest, forces.as_ref(), stop)?.map(|losses| losses.totals))
+        Ok(self.losses(hardest, forces.as_ref(), stop)?.map(|losses| self.losses_along(losses.totals)))
     }
 
     /// Returns the losses, given the sweep of the hardest point; none without friction.
@@ -154,15 +158,19 @@ impl CheckedSweep {
         period::RadialForces::of(&self.drive, self.load(), &self.deviations, sweep, stop)
     }
 
-    /// Solves the sweep; for a duty, that of its hardest point.
+    /// Solves the sweep; for a duty, that of its hardest point. Stresses are means along the teeth.
     ///
     /// # Errors
     /// The errors of [`solver::sweep_with_deviations`].
     pub fn solve(&self, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
-        solver::sweep_with_deviations(&self.drive, self.load(), &self.deviations, self.points, stop)
+        self.solve_at(self.points, stop)
     }
 
-    /// Solves for the peaks only.
+    fn solve_at(&self, points: Points, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
+        self.limited(|load| solver::sweep_with_deviations(&self.drive, load, &self.deviations, points, stop))
+    }
+
+    /// Solves for the peaks only. Stresses are means along the teeth.
     ///
     /// # Errors
     /// The errors of [`Self::solve`].
@@ -170,8 +178,49 @@ impl CheckedSweep {
         if !self.deviations.is_nil() {
             return Ok((&self.solve(stop)?).into());
         }
-        solver::peaks(&self.drive, self.load(), self.points, stop)
+        self.limited(|load| solver::peaks(&self.drive, load, self.points, stop))
     }
+
+    /// Runs a sweep whose torque capacity respects the fingers of the carrier.
+    fn limited<S: Limited>(&self, run: impl Fn(&LoadCase) -> Result<S, SolveError>) -> Result<S, SolveError> {
+        match &self.fingers {
+            Some(fingers) => fingers.limited(self.load(), run),
+            None => run(self.load()),
+        }
+    }
+
+    /// Returns the stress of the carrier's fingers, if they are calculated.
+    pub fn finger_stress(&self, peaks: &PerContact<solver::ContactPeaks>) -> Option<FingerStress> {
+        let output_torque_nm = self.load().output_torque_nm(&self.drive);
+        self.fingers.as_ref().map(|fingers| fingers.stress(peaks.carrier.force_n.value, output_torque_nm))
+    }
+
+    /// Returns the summary of a sweep with the stresses at the most loaded place along the teeth.
+    pub fn summary_along(&self, peaks: solver::SweepPeaks) -> solver::SweepPeaks {
+        match &self.fingers {
+            Some(fingers) => fingers.summary_along(peaks),
+            None => peaks,
+        }
+    }
+
+    fn losses_along(&self, totals: LossTotals) -> LossTotals {
+        match &self.fingers {
+            Some(fingers) => fingers::losses_along(fingers, totals),
+            None => totals,
+        }
+    }
+}
+
+/// Returns the fingers of the carrier, if they are calculated.
+fn checked_fingers(
+    design: &Design,
+    drive: &Drive,
+    backings: &Backings,
+    load: &LoadCase,
+) -> Result<Option<CarrierFingers>, NoAnswer> {
+    let parameters = design.finger_parameters().map_err(|violations| NoAnswer::impossible(&violations))?;
+    let fingers = backings.finger().map(|&beam| CarrierFingers::new(drive, beam, parameters, load.parameters()));
+    Ok(fingers.transpose().map_err(SolveError::from)?)
 }
 
 /// Returns the loads of a document. The hardest is already checked; the others differ from it only in torque.
@@ -211,6 +260,7 @@ impl Question for Sweep {
             violations.extend(found);
             None
         });
+        violations.extend(design.finger_parameters().err().into_iter().flatten());
         let points = design.sweep_points(limits.max_searched_states)?;
         let (drive, load, points) = match (draft.drive(), load, points) {
             (Some(drive), Some(load), Ok(points)) if violations.is_empty() => (drive, load, points),
@@ -237,10 +287,12 @@ impl Question for Sweep {
         let parts = design.parts_parameters()?;
         let backings = Backings::of(&drive, &draft, &parts, design.support());
         let model = design.complete_model(&load, error_of_model::has_pointed_tips(&drive));
+        let fingers = checked_fingers(design, &drive, &backings, &load)?;
         Ok(CheckedSweep {
             model,
             of_document: FindingAnswer::of_document(design, true),
             backings,
+            fingers,
             drive,
             duty: checked_duty(&duty, &load)?,
             is_duty: duty.is_asked,
@@ -264,12 +316,13 @@ impl Question for Sweep {
     fn is_short(checked: &CheckedSweep) -> bool {
         /// Solving and writing them takes about 0.1 ms; with Palmgren's law and all options 0.25 ms.
         const FEW_STATES: u64 = 400;
-        let CheckedSweep { drive, deviations, losses, points, with_gaps, with_wind_up, .. } = checked;
+        let CheckedSweep { drive, deviations, fingers, losses, points, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
         // The boundary elements of a tooth take longer than any short sweep, and so does the backlash.
         let is_plain = !with_gaps
             && !with_wind_up
             && losses.is_none()
+            && !fingers.is_some_and(|fingers| fingers.limits_fall_with_torque())
             && !load.parameters().ring_teeth_bend
             && !load.presses_corners(drive);
         match points {
@@ -279,18 +332,21 @@ impl Question for Sweep {
     }
 
     fn answer(checked: &CheckedSweep, stop: &dyn Stop) -> Result<SweepAnswer, NoAnswer> {
-        let CheckedSweep { drive, duty, deviations, backings, with_gaps, with_wind_up, .. } = checked;
+        let CheckedSweep { drive, duty, deviations, backings, fingers, with_gaps, with_wind_up, .. } = checked;
         let load = checked.load();
         let asks_without_load = *with_wind_up && *with_gaps;
         let points = if asks_without_load { checked.points.also_without_load() } else { checked.points };
-        let sweep = solver::sweep_with_deviations(drive, load, deviations, points, stop)?;
+        let sweep = checked.solve_at(points, stop)?;
         // For a million states each of the following steps takes tens of milliseconds.
         let go_on = || if stop.stopped() { Err(NoAnswer::stopped()) } else { Ok(()) };
         go_on()?;
         let mesh = sweep.mesh;
         let mut findings = drive_findings(drive)?;
         let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();
-        let of_contacts = findings::of_contacts(drive, load, &sweep.peaks, approaches_matter);
+        let peaks = fingers.as_ref().map_or(sweep.peaks, |fingers| fingers.peaks_along(&sweep.peaks));
+        let of_contacts = findings::of_contacts(drive, load, &peaks, approaches_matter);
+        let finger_stress = checked.finger_stress(&sweep.peaks);
+        let of_fingers = finger_stress.as_ref().and_then(findings::of_fingers);
         let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
         let of_wind_up = findings::of_wind_up(drive, load, &sweep);
         let of_projection = findings::of_projection(drive, load).map_err(SolveError::from)?;
@@ -305,13 +361,14 @@ impl Question for Sweep {
         let duty_answer = checked.is_duty.then(|| DutyAnswer::new(drive, duty, losses.as_ref()));
         let (losses, of_friction) = match losses {
             Some(DutyLosses { totals, hardest, findings, .. }) => {
+                let totals = checked.losses_along(totals);
                 (Some(LossesAnswer::new(&Mechanism::of(drive), totals, hardest, &sweep)?), findings)
             }
             None => (None, Vec::new()),
         };
         let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
         let of_model = of_half_widths.iter().chain(&of_friction).chain(&of_projection).chain(&of_backing);
-        let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts);
+        let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts).chain(&of_fingers);
         let causes = Causes {
             wave_generator_moves: load.parameters().wave_generator_moves,
             gap_fields: checked.gap_fields(),
@@ -339,13 +396,14 @@ impl Question for Sweep {
                 output_torque_nm: load.output_torque_nm(drive),
             },
             enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip && !load.presses_corners(drive),
-            peaks: PerContact::of(|contact| (*sweep.peaks.get(contact)).into()),
+            peaks: PerContact::of(|contact| (*peaks.get(contact)).into()),
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh(),
             loaded_teeth_per_zone: sweep.loaded_teeth(),
             wind_up: backlash
                 .map(|backlash| WindUpAnswer::new(drive, &sweep, backlash, unloaded_wind_up_deg))
                 .transpose()?,
             torque_capacity: sweep.torque_capacity,
+            fingers: fingers.as_ref().zip(finger_stress.as_ref()).map(|(of, stress)| FingersAnswer::new(of, stress)),
             duty: duty_answer,
             losses,
             radial_force_n,
@@ -356,7 +414,13 @@ impl Question for Sweep {
                 torque_balance_residual: sweep.torque_balance_residual,
                 period_closure_residual: sweep.period_closure_residual,
             },
-            states: StatesAnswer::new(sweep.states, *with_gaps || load.presses_corners(drive)),
+            states: StatesAnswer::new(
+                match fingers {
+                    Some(fingers) => fingers.states_along(sweep.states),
+                    None => sweep.states,
+                },
+                *with_gaps || load.presses_corners(drive),
+            ),
             findings,
         };
         let states = &answer.states;
@@ -555,13 +619,16 @@ impl SweepAnswer {
             let limit = if capacity.turns_past_teeth {
                 "beyond it the wave generator turns past its teeth".to_owned()
             } else {
-                format!("limited by {}", word(&capacity.contact))
+                format!("limited by {}", word(&capacity.limited_by).replace('_', " "))
             };
             writeln!(
                 writer,
                 "\ntorque capacity, input and output   {:.6} and {:.6} N·m, {limit} at {:.4} deg",
                 capacity.input_torque_nm, capacity.output_torque_nm, capacity.input_angle_deg
             )?;
+        }
+        if let Some(fingers) = &self.fingers {
+            fingers.write_text(writer)?;
         }
         if let Some(wind_up) = &self.wind_up {
             let range = |column: &[f64]| {

@@ -6,21 +6,11 @@ use std::f64::consts::PI;
 
 use crate::contact::{Contact, ContactLaw, Material, Materials, Part, PerContact};
 use crate::drive::{Draft, Drive, ToothShape};
+use crate::fingers::{FingerBeam, Fingers};
 use crate::gaps::MM_PER_UM;
 use crate::load_sharing::{LoadCase, LoadParameters};
 use crate::parts::{CarrierPart, PartsParameters, RIM};
 use crate::sweep::ContactPeaks;
-
-/// Support of the fingers between the carrier's slots, axially outside the teeth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
-#[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
-pub enum Fingers {
-    /// A disc at one end.
-    HeldAtOneEnd,
-    /// A disc at each end.
-    HeldAtBothEnds,
-}
 
 /// Support of the ring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,6 +46,10 @@ pub enum Backing {
     FingerAtBothEnds,
     /// A finger of the carrier held at one end.
     FingerAtOneEnd,
+    /// A finger of the carrier held at one end, its far end joined to the others by a ring.
+    FingerJoinedAtFarEnd,
+    /// A finger of the carrier held by a web in its middle.
+    FingerOnWeb,
 }
 
 impl Backing {
@@ -64,18 +58,22 @@ impl Backing {
         match self {
             Self::CamOnBore => Contact::WaveGenerator,
             Self::HousedRim | Self::FreeRim => Contact::Ring,
-            Self::FingerAtBothEnds | Self::FingerAtOneEnd => Contact::Carrier,
+            Self::FingerAtBothEnds | Self::FingerAtOneEnd | Self::FingerJoinedAtFarEnd | Self::FingerOnWeb => {
+                Contact::Carrier
+            }
         }
     }
 
-    /// True if parts with this support include it. If the support is not specified, the stiffer of two applies.
+    /// True if parts with this support include it. If the support is not specified, the stiffest applies.
     pub const fn is_of(self, support: &Support) -> bool {
         match self {
             Self::CamOnBore => true,
             Self::HousedRim => !matches!(support.rim, Some(Rim::Free)),
             Self::FreeRim => matches!(support.rim, Some(Rim::Free)),
-            Self::FingerAtBothEnds => !matches!(support.fingers, Some(Fingers::HeldAtOneEnd)),
+            Self::FingerAtBothEnds => matches!(support.fingers, None | Some(Fingers::HeldAtBothEnds)),
             Self::FingerAtOneEnd => matches!(support.fingers, Some(Fingers::HeldAtOneEnd)),
+            Self::FingerJoinedAtFarEnd => matches!(support.fingers, Some(Fingers::FarEndsJoined)),
+            Self::FingerOnWeb => matches!(support.fingers, Some(Fingers::WebInTheMiddle)),
         }
     }
 }
@@ -87,47 +85,6 @@ pub struct Estimate {
     pub backing: Backing,
     /// Additional displacement of the contact per newton, beyond the depth that the contact's law includes.
     pub compliance_mm_per_n: f64,
-}
-
-/// Finger between two slots as a straight beam along the axis, with an even load along one wall.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FingerBeam {
-    /// Length: the teeth's width.
-    pub length_mm: f64,
-    /// Thickness across the slots, at the middle of the height.
-    pub thickness_mm: f64,
-    /// Height along the radius.
-    pub height_mm: f64,
-}
-
-impl FingerBeam {
-    /// Returns the finger of a carrier. None if its slots overlap at the middle of its height.
-    fn of(drive: &Drive, carrier: &CarrierPart) -> Option<Self> {
-        let CarrierPart { inner_radius_mm, outer_radius_mm, slot_half_width_mm } = carrier;
-        let middle_mm = 0.5 * (inner_radius_mm + outer_radius_mm);
-        let half_spacing_rad = PI / drive.parameters().installed as f64;
-        let thickness_mm = 2.0 * (middle_mm * half_spacing_rad.sin() - slot_half_width_mm);
-        let (length_mm, height_mm) = (drive.tooth_width_mm(), outer_radius_mm - inner_radius_mm);
-        (thickness_mm > 0.0).then_some(Self { length_mm, thickness_mm, height_mm })
-    }
-
-    /// Returns the mean deflection along the finger divided by the force, which is the displacement of a straight tooth
-    /// on its wall. Bending and shear follow Timoshenko, with the shear coefficient 5/6 of a rectangle.
-    pub fn compliance_mm_per_n(&self, material: &Material, fingers: Fingers) -> f64 {
-        const SHEAR: f64 = 5.0 / 6.0;
-        let Self { length_mm, thickness_mm, height_mm } = *self;
-        let youngs_mpa = 1e3 * material.youngs_modulus_gpa;
-        let shear_mpa = youngs_mpa / (2.0 * (1.0 + material.poissons_ratio));
-        let area_mm2 = thickness_mm * height_mm;
-        let inertia_mm4 = area_mm2 * thickness_mm * thickness_mm / 12.0;
-        // Mean deflection under an even load: F L³/(20 E I) and F L/(3 κ G A); between two discs F L³/(720 E I) and F
-        // L/(12 κ G A).
-        let (bending, shear) = match fingers {
-            Fingers::HeldAtOneEnd => (20.0, 3.0),
-            Fingers::HeldAtBothEnds => (720.0, 12.0),
-        };
-        length_mm.powi(3) / (bending * youngs_mpa * inertia_mm4) + length_mm / (shear * SHEAR * shear_mpa * area_mm2)
-    }
 }
 
 /// Ring rim beyond its tooth spaces, as a curved strip in plane strain.
@@ -261,6 +218,11 @@ impl Backings {
         backings
     }
 
+    /// Returns the fingers of the carrier, if it has any.
+    pub const fn finger(&self) -> Option<&FingerBeam> {
+        self.finger.as_ref()
+    }
+
     /// Returns the support of the parts.
     pub const fn support(&self) -> &Support {
         &self.support
@@ -280,6 +242,8 @@ impl Backings {
             (Backing::FreeRim, free),
             (Backing::FingerAtBothEnds, finger(Fingers::HeldAtBothEnds)),
             (Backing::FingerAtOneEnd, finger(Fingers::HeldAtOneEnd)),
+            (Backing::FingerJoinedAtFarEnd, finger(Fingers::FarEndsJoined)),
+            (Backing::FingerOnWeb, finger(Fingers::WebInTheMiddle)),
         ]
         .into_iter()
         // A wall of nearly zero thickness has infinite compliance.

@@ -8,6 +8,7 @@ use crate::backlash::Backlash;
 use crate::cam::Hollow;
 use crate::contact::{Contact, ContactLaw, Material, Materials, PerContact, half_width_mm};
 use crate::drive::{Drive, ToothShape};
+use crate::fingers::FingerStress;
 use crate::load_sharing::{Compatibility, LoadCase};
 use crate::losses::{FirstOrderError, Fixed, Friction, MEASURED_TO, MEASURED_TO_ALONG_CAM, Mechanism};
 use crate::mesh::Mesh;
@@ -133,6 +134,8 @@ pub enum FindingCode {
     EfficiencyUncertain,
     /// Load on the wave generator's bearing above which its life equation is not valid.
     BearingLoadAboveHalfRating,
+    /// A finger of the carrier that yields or breaks by fatigue.
+    FingerOverstressed,
     /// Stress above the contact's allowable stress.
     StressAboveAllowable,
     /// Stress above the fatigue limit of bearing steel.
@@ -266,7 +269,9 @@ pub fn of_backing(shares: &Shares) -> Vec<Finding> {
     let soft = shares.shares.iter().filter(|(_, share)| *share > SOFT_BACKING_SHARE);
     let finding = |&(estimate, share): &(Estimate, f64)| {
         let (code, is_grave) = match estimate.backing {
-            Backing::FingerAtOneEnd => (Code::SlenderFingers, true),
+            Backing::FingerAtOneEnd | Backing::FingerJoinedAtFarEnd | Backing::FingerOnWeb => {
+                (Code::SlenderFingers, true)
+            }
             Backing::FingerAtBothEnds => (Code::SlenderFingers, false),
             Backing::FreeRim => (Code::SoftRim, true),
             Backing::HousedRim => (Code::SoftRim, false),
@@ -275,6 +280,12 @@ pub fn of_backing(shares: &Shares) -> Vec<Finding> {
         Some(Finding::grave_if(code, share, SOFT_BACKING_SHARE, is_grave))
     };
     soft.filter_map(finding).collect()
+}
+
+/// Returns a finding if the carrier's fingers have a safety below 1.
+pub fn of_fingers(stress: &FingerStress) -> Option<Finding> {
+    let least = stress.safety?.least();
+    (least < 1.0).then_some(Finding::warning(Code::FingerOverstressed, least, 1.0))
 }
 
 /// Returns a finding if the wind-up of a sweep exceeds the model's range.

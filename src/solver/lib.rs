@@ -41,6 +41,7 @@ pub mod contact;
 pub mod drawing;
 pub mod drive;
 pub mod findings;
+pub mod fingers;
 pub mod gaps;
 pub mod load_sharing;
 pub mod locus;

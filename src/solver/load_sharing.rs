@@ -166,6 +166,11 @@ impl LoadCase {
         if violations.is_empty() { Ok(Self(*parameters)) } else { Err(violations) }
     }
 
+    /// Returns the load with other allowable stresses of the contacts.
+    pub(crate) fn with_allowable_stress(&self, stress_mpa: PerContact<f64>) -> Self {
+        Self(LoadParameters { allowable_stress_mpa: Some(stress_mpa), ..self.0 })
+    }
+
     /// Returns the parameters, as given.
     pub const fn parameters(&self) -> &LoadParameters {
         &self.0
@@ -242,7 +247,7 @@ impl Weights {
 }
 
 /// Forces over `F_H`: 1, `F_K/F_H = cos γ/cos β`, `F_S/F_H = sin γ Z_G/U` \[1\], where `Z_G/U = k + s`.
-fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContact<f64> {
+pub(crate) fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContact<f64> {
     let t = center.tan_pressure_angle;
     let tan_ring = flank.teeth_per_wave() * t;
     let cos_cam = 1.0 / (1.0 + t * t).sqrt();
@@ -250,6 +255,16 @@ fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContac
         wave_generator: 1.0,
         ring: (1.0 + tan_ring * tan_ring).sqrt() * cos_cam,
         carrier: t * cos_cam * (flank.teeth_per_wave() + sense),
+    }
+}
+
+/// Returns the relative curvature of each contact of a tooth in the plane of motion.
+pub(crate) fn curvature_per_mm(drive: &Drive, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
+    let r = drive.parameters().tooth_radius_mm;
+    PerContact {
+        wave_generator: 1.0 / r + center.cam_contact.curvature_per_mm,
+        ring: 1.0 / (r * flank.regularity),
+        carrier: 1.0 / r,
     }
 }
 
@@ -520,7 +535,7 @@ impl<'a> LoadedDrive<'a> {
         position: Position,
     ) -> Result<(ToothCenter, PerContact<f64>), NotConverged> {
         let center = self.drive.flank().locus().at(position)?;
-        Ok((center, self.curvature_per_mm(&center, &self.drive.flank().at(&center))))
+        Ok((center, curvature_per_mm(self.drive, &center, &self.drive.flank().at(&center))))
     }
 
     /// Returns the gaps.
@@ -575,7 +590,7 @@ impl<'a> LoadedDrive<'a> {
             Some(_) => force_ratio,
             None => Weights::of(self.compatibility, sense, flank_curve, &center).0,
         };
-        let curvature_per_mm = self.curvature_per_mm(&center, &flank);
+        let curvature_per_mm = curvature_per_mm(self.drive, &center, &flank);
         let places = PerContact::try_of(|contact| {
             Ok::<_, SolveError>(tooth::Place {
                 force_ratio: *force_ratio.get(contact),
@@ -658,16 +673,6 @@ impl<'a> LoadedDrive<'a> {
         turned_rad * (ring_arm_mm - of_flank_mm)
     }
 
-    /// Returns the relative curvature of each contact of a tooth in the plane of motion.
-    fn curvature_per_mm(&self, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
-        let r = self.drive.parameters().tooth_radius_mm;
-        PerContact {
-            wave_generator: 1.0 / r + center.cam_contact.curvature_per_mm,
-            ring: 1.0 / (r * flank.regularity),
-            carrier: 1.0 / r,
-        }
-    }
-
     /// Returns the pressure model of a contact of a tooth.
     fn pressure(&self, contact: Contact, center: &ToothCenter, curvature_per_mm: f64) -> Result<Pressure, SolveError> {
         if let (Contact::Ring, Some(corner)) = (contact, self.corner_at(&center.position)) {
@@ -703,7 +708,7 @@ impl<'a> LoadedDrive<'a> {
         flank: &FlankPoint,
         force_n: &PerContact<f64>,
     ) -> Result<PerContact<f64>, SolveError> {
-        let curvature_per_mm = self.curvature_per_mm(center, flank);
+        let curvature_per_mm = curvature_per_mm(self.drive, center, flank);
         let width_mm = self.drive.tooth_width_mm();
         PerContact::try_of(|contact| {
             let pressure = self.pressure(contact, center, *curvature_per_mm.get(contact))?;

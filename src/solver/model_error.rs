@@ -5,10 +5,11 @@ mod measured;
 
 use measured::MEASURED;
 
-use crate::backing::{Backing, Fingers, Rim, Shares, Support};
+use crate::backing::{Backing, Estimate, Rim, Shares, Support};
 use crate::contact::{Contact, ContactLaw, LawName, Material, PerContact};
 use crate::drive::{Drive, ToothShape};
 use crate::findings::{SOFT_BACKING_SHARE, WIND_UP_SHARE_OF_PERIOD, WIND_UP_TIMES_LOBES_RAD, widest_half_widths_mm};
+use crate::fingers::Fingers;
 use crate::gaps::Deviations;
 use crate::load_sharing::{Compatibility, LoadCase, LoadParameters};
 use crate::mesh::Mesh;
@@ -178,7 +179,7 @@ pub enum Beyond {
 pub enum HeldCase {
     /// A rim in a housing, fingers at both ends. Also used if `parts` does not specify it.
     Housed,
-    /// Slender fingers held at both ends.
+    /// Slender fingers that are not held at one end alone.
     SlenderFingers,
     /// Fingers held at one end.
     FingersAtOneEnd,
@@ -206,12 +207,14 @@ impl Held {
             return None;
         }
         let has = |wanted: Backing| shares.shares.iter().find(|(estimate, _)| estimate.backing == wanted);
-        let is_soft = |&&(_, share): &&(_, f64)| share > SOFT_BACKING_SHARE;
+        let is_soft_finger = |&(estimate, share): &(Estimate, f64)| {
+            estimate.backing.contact() == Contact::Carrier && share > SOFT_BACKING_SHARE
+        };
         let case = if support.rim == Some(Rim::Free) && has(Backing::FreeRim).is_some() {
             HeldCase::FreeRim
         } else if support.fingers == Some(Fingers::HeldAtOneEnd) && has(Backing::FingerAtOneEnd).is_some() {
             HeldCase::FingersAtOneEnd
-        } else if has(Backing::FingerAtBothEnds).filter(is_soft).is_some() {
+        } else if shares.shares.iter().any(is_soft_finger) {
             HeldCase::SlenderFingers
         } else {
             HeldCase::Housed

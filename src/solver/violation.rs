@@ -109,6 +109,14 @@ pub enum Parameter {
     CarrierInnerRadius,
     /// Outer radius of the carrier, mm.
     CarrierOuterRadius,
+    /// Radius of the fillet at a finger's foot, mm.
+    FingerFilletRadius,
+    /// `R_p`: yield strength of the carrier, MPa.
+    YieldStrength,
+    /// `R_m`: tensile strength of the carrier, MPa.
+    TensileStrength,
+    /// `σ_W`: endurance limit of the carrier, MPa.
+    EnduranceLimit,
     /// Radius of the wave generator's bore, mm.
     BoreRadius,
     /// Clearance of a part: inward offset of its working surface, µm.
@@ -252,6 +260,7 @@ impl Parameter {
             | Self::RingOuterRadius
             | Self::CarrierInnerRadius
             | Self::CarrierOuterRadius
+            | Self::FingerFilletRadius
             | Self::BoreRadius
             | Self::Depth(_)
             | Self::BearingRadius
@@ -296,7 +305,11 @@ impl Parameter {
             },
             // At its ends the rounding of the angle is 2e-9 deg.
             Self::InputAngle => Range::closed(-1e7, 1e7, "deg"),
-            Self::AllowableStress | Self::AllowableStressAt(_) => Range::closed(1e-3, 1e6, "MPa"),
+            Self::AllowableStress
+            | Self::AllowableStressAt(_)
+            | Self::YieldStrength
+            | Self::TensileStrength
+            | Self::EnduranceLimit => Range::closed(1e-3, 1e6, "MPa"),
             Self::InputSpeed | Self::Duty(OfDutyPoint::InputSpeed, _) => Range::closed(1e-6, 1e6, "1/min"),
             Self::Duty(OfDutyPoint::ShareOfTime, _) => Range::closed(1e-9, 1.0, ""),
             Self::DutyPoints => Range::closed(1.0, MAX_DUTY_POINTS as f64, ""),

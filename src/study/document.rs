@@ -191,7 +191,8 @@ pub struct SearchDocument {
     /// the outer diameter.
     #[serde(default)]
     pub free: BTreeMap<String, FreeDocument>,
-    /// Limits on quantities, by name.
+    /// Limits on quantities, by name. Default: none, but a `finger_safety` of at least 1.5 if the base gives
+    /// `parts.carrier.strength`; `"finger_safety": { "min": 0 }` removes it.
     #[serde(default)]
     pub require: BTreeMap<String, RequireDocument>,
     /// The objectives: one to four quantities that are minimised or maximised.

@@ -118,12 +118,12 @@ impl Evaluator {
     ) -> Result<Loaded<'a>, NoAnswer> {
         let backlash = self.takes_backlash.then(|| checked.backlash(stop)).transpose()?;
         if !takes_columns {
-            return Ok(Loaded { checked, peaks: checked.peaks(stop)?, losses: None, radial_forces: None, backlash });
+            return Ok(Loaded::new(checked, checked.peaks(stop)?, backlash));
         }
         let sweep = checked.solve(stop)?;
         let losses = if self.takes_losses { checked.loss_totals(&sweep, stop)? } else { None };
         let radial_forces = if self.takes_radial_forces { checked.radial_forces(&sweep, stop)? } else { None };
-        Ok(Loaded { checked, peaks: (&sweep).into(), losses, radial_forces, backlash })
+        Ok(Loaded { losses, radial_forces, ..Loaded::new(checked, (&sweep).into(), backlash) })
     }
 
     /// Outer radius of the ring as it is drawn (docs/explanation/theory.md section 8). An impossible ring has no outer diameter.

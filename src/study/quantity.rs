@@ -3,6 +3,7 @@
 use serde::Serialize;
 use toothwave_calculation::sweep::CheckedSweep;
 use toothwave_solver::backlash::Backlash;
+use toothwave_solver::fingers::FingerStress;
 use toothwave_solver::losses::duty::LossTotals;
 use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::mesh::Mesh;
@@ -40,6 +41,8 @@ pub enum Needs {
     Load,
     /// A load and `load.allowable_stress_mpa`.
     AllowableStress,
+    /// A load and `parts.carrier.strength`.
+    CarrierStrength,
     /// A load and `friction`.
     Friction,
     /// A load, `friction` and a speed: `load.input_speed_rpm`, or the speeds of a `load.duty`.
@@ -123,10 +126,20 @@ pub(crate) struct Variant<'a> {
 pub(crate) struct Loaded<'a> {
     pub(crate) checked: &'a CheckedSweep,
     pub(crate) peaks: SweepPeaks,
+    /// Peaks with the stresses that are means along the teeth.
+    pub(crate) mean_peaks: PerContact<ContactPeaks>,
     /// Over all points of a duty; the rest is of its hardest.
     pub(crate) losses: Option<LossTotals>,
     pub(crate) radial_forces: Option<RadialForces>,
     pub(crate) backlash: Option<Backlash>,
+}
+
+impl<'a> Loaded<'a> {
+    /// Builds the results from the peaks of a sweep, whose stresses are means along the teeth.
+    pub(crate) fn new(checked: &'a CheckedSweep, peaks: SweepPeaks, backlash: Option<Backlash>) -> Self {
+        let mean_peaks = peaks.contacts;
+        Self { checked, peaks: checked.summary_along(peaks), mean_peaks, losses: None, radial_forces: None, backlash }
+    }
 }
 
 impl Variant<'_> {
@@ -148,6 +161,11 @@ impl Variant<'_> {
             let capacity = loaded.peaks.torque_capacity.as_ref();
             capacity.map_or(f64::NAN, |capacity| of(capacity.input_torque_nm, capacity.output_torque_nm))
         })
+    }
+
+    /// Returns a value of the carrier's fingers, 0 if they are not calculated.
+    fn fingers(&self, of: impl Fn(&FingerStress) -> Option<f64>) -> f64 {
+        self.loaded(|loaded| loaded.checked.finger_stress(&loaded.mean_peaks).as_ref().and_then(&of).unwrap_or(0.0))
     }
 
     fn losses(&self, of: impl Fn(&LossTotals) -> f64) -> f64 {
@@ -246,7 +264,7 @@ pub(crate) const TRANSMISSION_RATIO: &str = "transmission_ratio";
 pub(crate) const OUTER_DIAMETER_MM: &str = "outer_diameter_mm";
 
 /// All quantities, in the order in which they are listed.
-pub static QUANTITIES: [Quantity; 59] = [
+pub static QUANTITIES: [Quantity; 61] = [
     of_drive(
         TRANSMISSION_RATIO,
         "",
@@ -583,18 +601,37 @@ pub static QUANTITIES: [Quantity; 59] = [
         "",
         "Deflection of a carrier finger over the deflection of a tooth at its contacts. 0 without an estimate. Above 0.2 there is a finding.",
         Source::Definition("the `share` of the finger with its actual support among `/series_compliance_estimates` of the sweep, 0 if it is absent"),
-        |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.peaks.contacts).unwrap_or(0.0))),
+        |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.mean_peaks).unwrap_or(0.0))),
     )
     .not_below_zero(),
+    of_sweep(
+        "finger_stress_mpa",
+        "MPa",
+        "Largest bending stress at the foot of a carrier finger. 0 without a calculation, as for balls.",
+        sweep("/fingers/stress_mpa"),
+        |variant| Ok(variant.fingers(|stress| Some(stress.largest_mpa))),
+    )
+    .not_below_zero(),
+    Quantity {
+        needs: Needs::CarrierStrength,
+        ..of_sweep(
+            "finger_safety",
+            "",
+            "Safety of the carrier fingers against yield and fatigue. Below 1 there is a finding. 0 without a calculation, as for balls.",
+            sweep("/fingers/safety"),
+            |variant| Ok(variant.fingers(|stress| stress.safety.map(|safety| safety.least()))),
+        )
+        .not_below_zero()
+    },
     of_capacity(
         "torque_capacity_input_nm",
-        "Largest torque at the wave generator with which no contact exceeds the allowable stress.",
+        "Largest torque at the wave generator with which no contact exceeds the allowable stress and no finger its strength.",
         sweep("/torque_capacity/input_torque_nm"),
         |variant| Ok(variant.capacity(|input_nm, _| input_nm)),
     ),
     of_capacity(
         "torque_capacity_output_nm",
-        "Largest torque at the carrier with which no contact exceeds the allowable stress.",
+        "Largest torque at the carrier with which no contact exceeds the allowable stress and no finger its strength.",
         sweep("/torque_capacity/output_torque_nm"),
         |variant| Ok(variant.capacity(|_, output_nm| output_nm)),
     ),

@@ -13,7 +13,7 @@ use toothwave_solver::{Never, Parameter, Stop};
 use utoipa::ToSchema;
 
 use crate::ask::{beyond, escaped, fault, index_of, named, whole};
-use crate::document::{FreeDocument, Goal, RangeDocument, RequireDocument, SearchDocument};
+use crate::document::{Base, FreeDocument, Goal, RangeDocument, RequireDocument, SearchDocument};
 use crate::evaluate::{Evaluator, Outcome, Stopped};
 use crate::front::MOST_OBJECTIVES;
 use crate::limit::{Bound, Limit, limits};
@@ -135,6 +135,25 @@ pub(crate) struct Island {
     evaluated: u64,
     scan: Scan,
     scan_from: u64,
+}
+
+/// Least safety of the carrier's fingers, if a search gives the carrier's strength and no limit: usual in machine design
+/// for typical strengths.
+const FINGER_SAFETY: f64 = 1.5;
+
+impl SearchDocument {
+    /// Returns the document with the default limit on the safety of the carrier's fingers.
+    pub(crate) fn with_default_limits(&self) -> Self {
+        let mut document = self.clone();
+        let Base(base) = &self.base;
+        let at = |pointer: &str| path(pointer).and_then(|place| base.at(&place));
+        let is_ball = at("/drive/teeth/shape") == Some(&Tree::Text("ball".into()));
+        if at("/parts/carrier/strength").is_some() && !is_ball {
+            let limit = RangeDocument { min: Some(FINGER_SAFETY), max: None };
+            document.require.entry("finger_safety".into()).or_insert(RequireDocument::Range(limit));
+        }
+        document
+    }
 }
 
 impl Search {

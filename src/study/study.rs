@@ -129,6 +129,10 @@ impl Study {
     /// # Errors
     /// The same as [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
+        let document = &match document {
+            StudyDocument::Search(search) => StudyDocument::Search(search.with_default_limits()),
+            StudyDocument::Map(_) | StudyDocument::Sensitivity(_) | StudyDocument::Tolerance(_) => document.clone(),
+        };
         let mut study = Self::unnamed(document, limits)?;
         let inputs = if let Kind::Sensitivity(sensitivity) = &study.kind { Some(sensitivity.asked()) } else { None };
         study.id = identity::id(document, &study.template, &study.evaluator.quantities, inputs, &limits.calculation)?;
@@ -392,8 +396,10 @@ fn asked_quantities(names: &[String], template: &Template) -> Result<Vec<&'stati
     if names.is_empty() {
         let has = template.examples().map(what_it_has).min().unwrap_or(Needs::Drive);
         let known = template.examples().all(has_allowable_stress);
+        let has_strength = template.examples().all(has_carrier_strength);
         let is_had = |quantity: &&Quantity| match quantity.needs {
             Needs::AllowableStress => known,
+            Needs::CarrierStrength => has_strength,
             needs => needs <= has,
         };
         return Ok(QUANTITIES.iter().filter(is_had).collect());
@@ -408,6 +414,10 @@ fn at<'a>(tree: &'a Tree, place: &[&str]) -> Option<&'a Tree> {
 
 fn has_allowable_stress(tree: &Tree) -> bool {
     at(tree, &["load", "allowable_stress_mpa"]).is_some()
+}
+
+fn has_carrier_strength(tree: &Tree) -> bool {
+    at(tree, &["load"]).and(at(tree, &["parts", "carrier", "strength"])).is_some()
 }
 
 /// True if the document sets the speed of the wave generator. Every point of a duty does.
@@ -434,6 +444,9 @@ fn require_what_quantities_need(quantities: &[&'static Quantity], tree: &Tree) -
             Needs::Load => &[(&["load"], "a load")],
             Needs::AllowableStress => {
                 &[(&["load"], "a load"), (&["load", "allowable_stress_mpa"], "an allowable stress")]
+            }
+            Needs::CarrierStrength => {
+                &[(&["load"], "a load"), (&["parts", "carrier", "strength"], "the strength of the carrier")]
             }
             Needs::Friction => &[(&["load"], "a load"), (&["friction"], "friction")],
             Needs::FrictionAndSpeed if has_speed(tree) => &[(&["friction"], "friction")],

@@ -111,7 +111,8 @@ pub(crate) fn finding_codes() -> Vec<FindingCode> {
         ClearanceUndercutsRing => FrictionBeyondMeasured,
         FrictionBeyondMeasured => EfficiencyUncertain,
         EfficiencyUncertain => BearingLoadAboveHalfRating,
-        BearingLoadAboveHalfRating => StressAboveAllowable,
+        BearingLoadAboveHalfRating => FingerOverstressed,
+        FingerOverstressed => StressAboveAllowable,
         StressAboveAllowable => StressAboveFatigueLimit,
         StressAboveFatigueLimit => DeprecatedField,
         DeprecatedField => SetBackTwice;

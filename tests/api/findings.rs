@@ -607,6 +607,9 @@ async fn every_finding_occurs_over_http() {
         all.extend(findings(&document).await);
     }
     all.extend(findings(&held(json!({ "ring": { "rim": "free" } }))).await);
+    let weak =
+        json!({ "carrier": { "strength": "c45-n", "fingers": "held_at_one_end", "finger_fillet_radius_mm": 0.1 } });
+    all.extend(findings(&held(weak)).await);
     all.extend(findings(&grooved(3.001)).await);
     all.extend(findings(&on_a_bearing(3000.0, &json!({ "input_torque_nm": 2.0 }))).await);
     for document in [undercut(), thin_walls(), cleared(9000.0), grooved(3.1)] {

@@ -24,6 +24,7 @@ mod entry;
 mod examples;
 mod extremes;
 mod findings;
+mod fingers;
 mod friction;
 mod meshes;
 mod modification;

@@ -298,6 +298,10 @@ fn parameters() -> Vec<Parameter> {
         Parameter::RingOuterRadius,
         Parameter::CarrierInnerRadius,
         Parameter::CarrierOuterRadius,
+        Parameter::FingerFilletRadius,
+        Parameter::YieldStrength,
+        Parameter::TensileStrength,
+        Parameter::EnduranceLimit,
         Parameter::BoreRadius,
         Parameter::InputAngle,
     ];

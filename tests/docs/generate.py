@@ -200,7 +200,7 @@ def design_document(document):
 
 
 def quantities(listed):
-    needs = {"drive": "", "load": "a load", "allowable_stress": "an allowable stress", "friction": "a load and friction"}
+    needs = {"drive": "", "load": "a load", "allowable_stress": "an allowable stress", "carrier_strength": "the carrier's strength", "friction": "a load and friction"}
     rows = [["quantity", "unit", "needs", "meaning"]]
     for quantity in listed:
         words = needs.get(quantity["needs"], quantity["needs"].replace("_", " "))

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
-import { designOf, enter, field, notes, pick, resultOf, setDocument, settled, testBed } from './harness.js';
+import { designOf, enter, field, firstDesign, notes, pick, resultOf, setDocument, settled, testBed } from './harness.js';
 
 const bed = testBed({ before, after, afterEach });
 const RADIUS = '/drive/teeth/radius_mm';
@@ -10,7 +10,7 @@ const RADIUS = '/drive/teeth/radius_mm';
 test('opens on the default model', async () => {
   const page = await bed.open({ example: null });
   const { drive, load } = await bed.server.example('paper-5.1');
-  assert.deepEqual(await designOf(page), { drive, load });
+  assert.deepEqual(await designOf(page), firstDesign({ drive, load }));
   const stress = () => resultOf(page, 'Contact stress, ring');
   const before = await stress();
   await enter(page, '/parts/ring/clearance_um', 10);
@@ -18,6 +18,19 @@ test('opens on the default model', async () => {
   assert.equal(await stress(), sweep.peaks.ring.stress_mpa.value);
   assert.ok(Math.abs((await stress()) / before - 1) < 0.05, 'not the paper’s answer to it');
   assert.match(await page.textContent(`${field('/model/compatibility')} option[value=projection]`), /^As in the paper/);
+});
+
+test('first design tells what limits its torque', async () => {
+  const page = await bed.open({ example: null });
+  const tiles = () => page.textContent('#key-figures');
+  assert.match(await tiles(), /Torque capacity663.\d N·moutput; limited by contact at the ring/);
+  assert.match(await tiles(), /Safety of the fingers[2-9].*far ends joined, assumed/);
+  await page.click('summary:has-text("Parts as they are made")');
+  await page.selectOption(field('/parts/carrier/strength'), 'c45-n');
+  await page.selectOption(field('/parts/carrier/fingers'), 'held_at_one_end');
+  await settled(page);
+  assert.match(await tiles(), /limited by fatigue of the carrier’s fingers/);
+  assert.match(await tiles(), /Safety of the fingers.*held at one end/);
 });
 
 test('notice lists further changes made by a choice', async () => {

@@ -358,7 +358,7 @@ test('form asks for further options, table answers them', async () => {
     assert.equal(await resultOf(page, label), value, label);
   }
   const limit = page.locator('#table tr', { hasText: 'Limited by' });
-  assert.match(await limit.textContent(), new RegExp(capacity.limited_by.replace('_', ' ')));
+  assert.match(await limit.textContent(), new RegExp(`contact at the ${capacity.limited_by.replace('_', ' ')}`));
   // Each value has its reference and its difference.
   await page.click('#keep');
   await enter(page, '/parts/ring/clearance_um', 8);
@@ -1123,6 +1123,7 @@ const OTHER_REPORTS = {
     model: { compatibility: 'projection' },
   },
   slender_fingers: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { carrier: { fingers: 'held_at_one_end' } } },
+  finger_overstressed: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { carrier: { fingers: 'held_at_one_end', strength: 'c45-n', finger_fillet_radius_mm: 0.1 } } },
   soft_rim: { drive: CASE_5_1, load: { input_torque_nm: 20 }, parts: { ring: { rim: 'free' } } },
   projection_with_gap: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { compatibility: 'projection' }, parts: { ring: { clearance_um: 10 } } },
   deprecated_field: { drive: CASE_5_1, load: { input_torque_nm: 20 }, model: { wave_generator_moves: false } },

@@ -5,11 +5,10 @@ use std::f64::consts::PI;
 
 use serde::Deserialize;
 use toothwave_solver::Compatibility::VirtualWork;
-use toothwave_solver::backing::{
-    Backing, Backings, Estimate, FingerBeam, Fingers, HeldStrip, Rim, RimStrip, Shares, Support,
-};
+use toothwave_solver::backing::{Backing, Backings, Estimate, HeldStrip, Rim, RimStrip, Shares, Support};
 use toothwave_solver::drive::Draft;
 use toothwave_solver::findings;
+use toothwave_solver::fingers::{FOOT_IN_DISC, FingerBeam, Fingers};
 use toothwave_solver::model_error::{self, Beyond, Held, HeldCase};
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::{
@@ -89,7 +88,9 @@ fn finger_compliance_matches_finite_elements() {
     for finger in results().fingers {
         let Finger { length_mm, thickness_mm, height_mm, at_both_ends, compliance_mm_per_n } = finger;
         let held = if at_both_ends { Fingers::HeldAtBothEnds } else { Fingers::HeldAtOneEnd };
-        let found = FingerBeam { length_mm, thickness_mm, height_mm }.compliance_mm_per_n(&Material::STEEL, held);
+        // Held in rigid discs, and pressed square to their sides.
+        let beam = FingerBeam { length_mm, thickness_mm, height_mm, count: i64::MAX, foot: 0.0 };
+        let found = beam.compliance_mm_per_n(&Material::STEEL, held);
         assert!(
             (found / compliance_mm_per_n - 1.0).abs() < if at_both_ends { 0.05 } else { 0.01 },
             "{length_mm} x {thickness_mm}, {held:?}: {found:e}, by finite elements {compliance_mm_per_n:e}"
@@ -146,7 +147,13 @@ fn finger_thickness_is_wall_distance_at_mid_height() {
     let shares = shares(&PAPER_5_1, &johnson(20.0), AT_ONE_END).unwrap();
     let found = shares.shares.iter().find(|(estimate, _)| estimate.backing == Backing::FingerAtOneEnd).unwrap().0;
     // From 58.8 to 65.2 mm. The middles of two slots are 2 · 62 sin(π/28) apart.
-    let beam = FingerBeam { length_mm: 15.0, thickness_mm: 124.0 * (PI / 28.0).sin() - 10.0, height_mm: 6.4 };
+    let beam = FingerBeam {
+        length_mm: 15.0,
+        thickness_mm: 124.0 * (PI / 28.0).sin() - 10.0,
+        height_mm: 6.4,
+        count: 28,
+        foot: FOOT_IN_DISC,
+    };
     let expected = beam.compliance_mm_per_n(&Material::STEEL, Fingers::HeldAtOneEnd);
     assert!((found.compliance_mm_per_n / expected - 1.0).abs() < 1e-12, "{} {expected}", found.compliance_mm_per_n);
 }
@@ -202,7 +209,7 @@ fn fingers_held_at_one_end_soften_drive() {
     let (before, after) = (swept(&PAPER_5_1, &plain, 50), swept(&PAPER_5_1, &given, 50));
     let wind_up = after.input_angles.wind_up_deg[0] / before.input_angles.wind_up_deg[0];
     let peak = after.peaks.wave_generator.force_n.value / before.peaks.wave_generator.force_n.value;
-    assert!((1.9..2.0).contains(&wind_up) && (0.86..0.885).contains(&peak), "{wind_up}, {peak}");
+    assert!((2.15..2.3).contains(&wind_up) && (0.86..0.9).contains(&peak), "{wind_up}, {peak}");
     assert!((1.0..1.2).contains(&((1.0 + estimate.1) / wind_up)), "share {}", estimate.1);
     // A given compliance no longer counts as left out.
     let left = shares(&PAPER_5_1, &given, AT_ONE_END).unwrap();
@@ -276,11 +283,12 @@ fn only_makeable_parts_with_line_contact_have_estimates() {
         assert!(estimates.iter().all(|Estimate { compliance_mm_per_n, .. }| *compliance_mm_per_n >= 0.0));
         estimates.into_iter().map(|estimate| estimate.backing).collect()
     };
-    let fingers = [Backing::FingerAtBothEnds, Backing::FingerAtOneEnd];
+    let fingers =
+        [Backing::FingerAtBothEnds, Backing::FingerAtOneEnd, Backing::FingerJoinedAtFarEnd, Backing::FingerOnWeb];
     let rims = [Backing::HousedRim, Backing::FreeRim];
     let all = PartsParameters { bore_radius_mm: Some(20.0), ..PartsParameters::default() };
     assert_eq!(of(&PAPER_5_1, all), [&[Backing::CamOnBore][..], &rims, &fingers].concat());
-    assert_eq!(of(&PAPER_5_1, PartsParameters::default()), [rims, fingers].concat());
+    assert_eq!(of(&PAPER_5_1, PartsParameters::default()), [&rims[..], &fingers].concat());
     let without_rim = PartsParameters { ring_outer_radius_mm: Some(60.0), ..PartsParameters::default() };
     assert_eq!(of(&PAPER_5_1, without_rim), fingers);
     let without_walls = PartsParameters { carrier_inner_radius_mm: Some(70.0), ..PartsParameters::default() };

@@ -1,7 +1,7 @@
 //! True extremes, wind-up and torque capacity against the 60-digit calculation of `tests/reference/reference.py`.
 
 use toothwave_solver::contact::{SHEAR_DEPTH, SHEAR_SHARE};
-use toothwave_solver::sweep::Points;
+use toothwave_solver::sweep::{LimitedBy, Points};
 use toothwave_solver::{Contact, PerContact};
 
 use crate::reference::{Case, Worst, number};
@@ -76,7 +76,8 @@ fn allowable_stress_is_reached_at_torque_capacity() {
             let allowed = 1e-13 * value + condition[kind].as_f64().unwrap_or(0.0);
             worst.see(kind, &name, (found - value).abs(), allowed);
         }
-        let (_, limited_by) = CONTACTS.iter().find(|(contact, _)| *contact == capacity.contact).unwrap();
+        let (_, limited_by) =
+            CONTACTS.iter().find(|(contact, _)| LimitedBy::from(*contact) == capacity.limited_by).unwrap();
         assert_eq!(Some(*limited_by), expected["limited_by"].as_str(), "{name}");
     }
     worst.assert_all_within();

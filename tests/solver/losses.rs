@@ -1110,12 +1110,12 @@ fn capacity_is_least_over_contacts() {
             let mut limits = everywhere(1e6);
             *limits.get_mut(contact) = *allowable.get(contact);
             let capacity = capacity(limits);
-            assert_eq!(capacity.contact, contact);
+            assert_eq!(capacity.limited_by, contact.into());
             capacity.input_torque_nm
         });
         let least = alone.iter().copied().fold(f64::INFINITY, f64::min);
         let all = capacity(allowable);
         assert_eq!(all.input_torque_nm, least);
-        assert_eq!(alone[CONTACTS.iter().position(|&contact| contact == all.contact).unwrap()], least);
+        assert_eq!(alone[CONTACTS.iter().position(|&contact| all.limited_by == contact.into()).unwrap()], least);
     }
 }

@@ -617,3 +617,25 @@ fn result_size_of_long_document_is_bounded() {
     assert!(read(100).is_ok());
     assert_eq!(read(9000).err().map(|refused| refused.code), Some(NoAnswerCode::TooManyVariants));
 }
+
+/// Returns a search for strong fingers, with this base.
+fn of_fingers(base: Value) -> Value {
+    let free = json!({ "/drive/teeth/width_mm": { "min": 5.0, "max": 40.0 } });
+    let objectives = json!([{ "quantity": "finger_safety", "goal": "max" }]);
+    json!({ "study": "search", "base": base, "evaluations": 400, "free": free, "objectives": objectives })
+}
+
+#[test]
+fn strength_of_carrier_limits_safety_of_fingers() {
+    let base = with(&paper(), "/parts", json!({ "carrier": { "strength": "c45-n" } }));
+    let search = of_fingers(base.clone());
+    let limit = |min: f64| with(&search, "/require", json!({ "finger_safety": { "min": min } }));
+    let id = |document: &Value| study(document).unwrap().id();
+    // The default written out is the same study; another limit is not.
+    assert_eq!(id(&search), id(&limit(1.5)));
+    assert_ne!(id(&search), id(&limit(0.0)));
+    let safety = number(&answer(&search)["front"][0]["quantities"]["finger_safety"]);
+    assert!(safety >= 1.5, "{safety}");
+    // Without a strength there is no safety.
+    assert_eq!(faulty(&of_fingers(paper())), ("/base/parts/carrier/strength".into(), "missing_field".into()));
+}

@@ -1,10 +1,12 @@
 //! Settings of the endpoints: input angles of a sweep, sampling of profiles, parts and assembly of drawings.
 
 use serde::{Deserialize, Serialize};
-use toothwave_solver::backing::{Fingers, Rim};
+use toothwave_solver::backing::Rim;
+use toothwave_solver::fingers::Fingers;
 use utoipa::ToSchema;
 
 use super::number::{Whole, given};
+use super::strength::StrengthDocument;
 use crate::key::{Encode, Encoder, encoded};
 
 /// The input angles of a sweep.
@@ -94,7 +96,8 @@ impl PartsDocument {
     /// Returns the data of the parts on which a load's answer depends: gaps, and the supports of the contacts.
     pub(crate) fn under_load(&self) -> impl Encode + '_ {
         let Self { wave_generator, teeth, ring, carrier } = self;
-        (wave_generator, teeth, ring, ring.rim, carrier, carrier.fingers)
+        let CarrierPartDocument { fingers, finger_fillet_radius_mm, strength, .. } = carrier;
+        (wave_generator, teeth, ring, ring.rim, carrier, (fingers, finger_fillet_radius_mm, strength))
     }
 }
 
@@ -159,11 +162,21 @@ pub struct CarrierPartDocument {
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
-    /// Support of the fingers between the slots. A sweep estimates the compliance from it; drawings do not use it.
-    /// Default: held at both ends, assumed by the findings.
+    /// Support of the fingers between the slots. A sweep calculates compliance and strength from it. If they are held at
+    /// one end or in the middle, contact stresses are those at the place where the load along a tooth is largest.
+    /// Default: held at both ends for the compliance, far ends joined for the strength; contact stresses are even.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub fingers: Option<Fingers>,
+    /// Radius of the fillet at the foot of a finger, in mm. Default: a tenth of the finger's thickness.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    pub finger_fillet_radius_mm: Option<f64>,
+    /// Strength of the carrier's material: a name from `GET /v1/materials`, or numbers. With it a sweep calculates the
+    /// safety of the fingers, which also limits the torque capacity. Default: no safety.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub strength: Option<StrengthDocument>,
 }
 
 /// Position of the parts in a drawing of the assembly.
@@ -201,7 +214,7 @@ impl Encode for RingPartDocument {
 /// Without the support of the part, as above.
 impl Encode for CarrierPartDocument {
     fn encode(&self, encoder: &mut Encoder) {
-        let Self { inner_radius_mm, outer_radius_mm, clearance_um, fingers: _ } = self;
+        let Self { inner_radius_mm, outer_radius_mm, clearance_um, .. } = self;
         (inner_radius_mm, outer_radius_mm, clearance_um).encode(encoder);
     }
 }

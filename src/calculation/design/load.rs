@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use toothwave_solver::fingers::LoadCycle;
 use toothwave_solver::violation::Range;
 use toothwave_solver::{Material, Parameter, PerContact};
 use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
@@ -70,6 +71,9 @@ pub struct LoadDocument {
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
     pub input_speed_rpm: Option<f64>,
+    /// Course of the load on the carrier's fingers, for their fatigue. Default: pulsating.
+    #[serde(default)]
+    pub cycle: LoadCycle,
     /// Load spectrum: one to 100 loads, whose shares of the running time add up to one.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, min_items = 1, max_items = 100)]
@@ -207,7 +211,9 @@ impl Encode for AllowableStressDocument {
 encoded! {
     struct MaterialsDocument { wave_generator, teeth, ring, carrier }
     struct MaterialDocument { youngs_modulus_gpa, poissons_ratio }
-    struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa, input_speed_rpm, duty }
+    struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa, input_speed_rpm, cycle, duty }
     struct DutyPointDocument { input_torque_nm, output_torque_nm, input_speed_rpm, share_of_time }
     struct StressByContactDocument { wave_generator, ring, carrier }
 }
+
+encoded!(enum LoadCycle);

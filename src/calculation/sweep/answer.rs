@@ -15,6 +15,7 @@ use crate::findings::FindingAnswer;
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::backlash::BacklashAnswer;
 use crate::sweep::duty::DutyAnswer;
+use crate::sweep::fingers::FingersAnswer;
 use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
 
 /// Forces and contact stresses over one period: of one meshing zone if the zones are alike, otherwise of all zones.
@@ -38,7 +39,8 @@ pub struct SweepAnswer {
     /// True if a tooth takes load as soon as it enters, because its flank ends before its lever arm becomes zero. The
     /// loads of the other teeth then jump.
     pub enters_under_load: bool,
-    /// The largest force and stress of each contact, over the states.
+    /// The largest force and stress of each contact, over the states. If the load along a tooth is uneven, stresses are
+    /// those at its most loaded place (`fingers`).
     pub peaks: PerContact<ContactPeaksAnswer>,
     /// Numbers of teeth in mesh over the input angle: of one zone if the zones are alike, otherwise of all zones.
     pub teeth_in_mesh_per_zone: TeethInMesh,
@@ -54,6 +56,10 @@ pub struct SweepAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub torque_capacity: Option<TorqueCapacity>,
+    /// Strength of the carrier's fingers. Left out for balls, and for a carrier that cannot be made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub fingers: Option<FingersAnswer>,
     /// Points of the duty, with `load.duty`. The other fields belong to the point with the largest torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]

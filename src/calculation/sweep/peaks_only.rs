@@ -12,6 +12,7 @@ use crate::sweep::answer::{
 };
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::DutyAnswer;
+use crate::sweep::fingers::FingersAnswer;
 use crate::sweep::losses::LossTotals;
 use serde::{Serialize, Serializer};
 
@@ -42,6 +43,8 @@ struct View<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     torque_capacity: &'a Option<TorqueCapacity>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    fingers: &'a Option<FingersAnswer>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     duty: &'a Option<DutyAnswer>,
     #[serde(skip_serializing_if = "Option::is_none")]
     losses: Option<&'a LossTotals>,
@@ -67,6 +70,7 @@ impl Serialize for PeaksOnlyAnswer {
             teeth_in_mesh_per_zone: &sweep.teeth_in_mesh_per_zone,
             loaded_teeth_per_zone: &sweep.loaded_teeth_per_zone,
             torque_capacity: &sweep.torque_capacity,
+            fingers: &sweep.fingers,
             duty: &sweep.duty,
             losses: sweep.losses.as_ref().map(|losses| &losses.totals),
             checks: &sweep.checks,

@@ -5,8 +5,9 @@ import { byId, html, setAttributes } from './dom.js';
 import { getJson } from './service.js';
 import { SERVICE, t } from './texts.js';
 
-/** The page opens on the drive of this example. */
+/** The page opens on the drive of this example, and tells what limits its torque if it is of steel. */
 const FIRST_DRIVE = 'paper-5.1';
+const STEEL_LIMITS = { allowable_stress_mpa: 1500, strength: '42crmo4-qt' };
 
 /** A title without what its colon leads to. */
 export const shortTitle = (title) => title.split(/[:\uff1a]/)[0];
@@ -23,7 +24,9 @@ export class Examples {
     const { examples } = await getJson('v1/examples');
     const loaded = await Promise.all(examples.map(async ({ name, title, href }) => ({ name, title: SERVICE.examples?.[name] ?? title, design: await getJson(href.slice(1)) })));
     const { drive, load } = (loaded.find(({ name }) => name === FIRST_DRIVE) ?? loaded[0]).design;
-    this.#all = [{ name: 'first', title: t('design.first'), design: { drive, load } }, ...loaded];
+    const { allowable_stress_mpa, strength } = STEEL_LIMITS;
+    const design = { drive, load: { ...load, allowable_stress_mpa }, parts: { carrier: { strength } } };
+    this.#all = [{ name: 'first', title: t('design.first'), design }, ...loaded];
   }
 
   get isLoaded() {

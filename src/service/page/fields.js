@@ -6,6 +6,7 @@ import {
   withRing, withVirtualWork,
 } from './design.js';
 import { choice, flag, group, lines, number, oneOf, unlessSaid, variant, whole } from './field.js';
+import { STRENGTHS } from './strengths.js';
 import { counted, t, textOf } from './texts.js';
 
 /** Shares of the value on either side that a slider spans. */
@@ -222,6 +223,7 @@ export const GROUPS = [
         likely: USUAL_SPEED_RPM,
         when: (design) => at(design, '/load/duty') === undefined,
       }),
+      unlessSaid('/load/cycle', [{ value: 'pulsating' }, { value: 'reversed' }]),
       number('/load/allowable_stress_mpa', 'σ', 'MPa', { slider: WIDE, optional: (design) => (at(design, '/load/allowable_stress_mpa') === undefined ? t('empty.not_asked') : t('empty.by_contact')) }),
     ],
   },
@@ -357,7 +359,9 @@ export const GROUPS = [
         fields: [
           freeRadius('carrier', 'inner_radius', 'R_i', 'tenth_free'),
           freeRadius('carrier', 'outer_radius', 'R_o', 'tenth_free'),
-          unlessSaid('/parts/carrier/fingers', [{ value: 'held_at_both_ends' }, { value: 'held_at_one_end' }]),
+          unlessSaid('/parts/carrier/fingers', [{ value: 'held_at_both_ends' }, { value: 'far_ends_joined' }, { value: 'held_at_one_end' }, { value: 'web_in_the_middle' }]),
+          number('/parts/carrier/finger_fillet_radius_mm', 'r_f', 'mm', { optional: () => t('empty.fillet'), step: 0.1 }),
+          unlessSaid('/parts/carrier/strength', STRENGTHS),
         ],
       },
     ],

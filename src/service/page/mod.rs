@@ -102,6 +102,7 @@ const ASSETS: &[Asset] = assets![
     "slider.js" as SCRIPT,
     "states.js" as SCRIPT,
     "status.js" as SCRIPT,
+    "strengths.js" as SCRIPT,
     "studies.js" as SCRIPT,
     "study-view.js" as SCRIPT,
     "terms.js" as SCRIPT,

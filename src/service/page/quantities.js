@@ -7,7 +7,7 @@ import { capital, t, textOf } from './texts.js';
 
 const GROUPS = [
   { title: t('quantities.geometry'), needs: ['drive'] },
-  { title: t('quantities.load'), needs: ['load', 'allowable_stress'] },
+  { title: t('quantities.load'), needs: ['load', 'allowable_stress', 'carrier_strength'] },
   { title: t('quantities.friction'), needs: ['friction', 'friction_and_speed'] },
 ];
 
@@ -16,6 +16,7 @@ const HAS = {
   drive: () => true,
   load: (design) => at(design, '/load') !== undefined,
   allowable_stress: (design) => at(design, '/load/allowable_stress_mpa') !== undefined,
+  carrier_strength: (design) => at(design, '/load') !== undefined && at(design, '/parts/carrier/strength') !== undefined,
   friction: (design) => at(design, '/load') !== undefined && at(design, '/friction') !== undefined,
   friction_and_speed: (design) => at(design, '/friction') !== undefined && (at(design, '/load/input_speed_rpm') ?? at(design, '/load/duty')) !== undefined,
 };

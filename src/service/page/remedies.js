@@ -40,10 +40,11 @@ const REMEDIES = {
   palmgren_beyond_steel: () => johnson,
   projection_on_steep_flank: () => virtualWork,
   projection_with_gap: () => virtualWork,
-  slender_fingers: backing('carrier', 'finger_at_both_ends', 'finger_at_one_end'),
+  slender_fingers: backing('carrier', 'finger_at_both_ends', 'finger_at_one_end', 'finger_joined_at_far_end', 'finger_on_web'),
   soft_rim: backing('ring', 'housed_rim', 'free_rim'),
   bearing_load_above_half_rating: ({ value }) => set('/friction/wave_generator/bearing_load_rating_n', above(2 * value, 10), 'N'),
   stress_above_allowable: capacity,
+  finger_overstressed: capacity,
 };
 
 /** The remedy of a finding as `{ label, change(design) }`, where it is a value. */

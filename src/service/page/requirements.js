@@ -6,6 +6,7 @@ import * as field from './field.js';
 import { number as digits } from './format.js';
 import { CONTACTS } from './motion.js';
 import { standardRadiiMm } from './rounding.js';
+import { STRENGTHS } from './strengths.js';
 import { counted, t } from './texts.js';
 
 export const ROOT = '/find';
@@ -22,6 +23,8 @@ const RIM = 1.2;
 const LEAST_WALL = 0.25;
 /** A finding speaks of fingers that give way by more than this share of what a tooth does at its contacts. */
 const SOFTEST_FINGER = 0.2;
+/** Against yield and fatigue of the fingers under a typical strength of the material. */
+const LEAST_SAFETY = 1.5;
 /** A rule of thumb: lower carriers are sheets. */
 const LEAST_CARRIER_MM = 3;
 const STEEPEST_DEG = 70;
@@ -88,6 +91,8 @@ export const FIRST = {
     wall: LEAST_WALL,
     carrier_space_mm: LEAST_CARRIER_MM,
     fingers: SOFTEST_FINGER,
+    carrier_strength: '42crmo4-qt',
+    finger_safety: LEAST_SAFETY,
     friction: 0.05,
     wave_generators: { harmonic_two: true, ellipse: true, eccentric: true },
     shapes: { cylinder: true },
@@ -122,6 +127,8 @@ export const GROUPS = [
     fields: [
       number('allowable_stress_mpa', 'σ', 'MPa', { likely: 1500, step: 50 }),
       ...CONTACTS.map(({ key }) => number(`allowable_${key}_mpa`, '', 'MPa', { optional: () => t('empty.no_lower'), step: 50 })),
+      field.choice(`${ROOT}/carrier_strength`, STRENGTHS),
+      number('finger_safety', 'S', '', { optional: () => t('empty.not_asked'), step: 0.1 }),
     ],
   },
   {
@@ -170,6 +177,7 @@ const FIELDS = {
   slot_wall_over_slot_width: 'wall',
   carrier_radial_space_mm: 'carrier_space_mm',
   carrier_finger_share: 'fingers',
+  finger_safety: 'finger_safety',
   efficiency_ring_fixed: 'efficiency',
   peak_stress_wave_generator_mpa: 'allowable_wave_generator_mpa',
   peak_stress_ring_mpa: 'allowable_ring_mpa',
@@ -188,7 +196,7 @@ function required(requirements, shape) {
     const allowable = asked(requirements, `allowable_${key}_mpa`);
     return allowable === undefined ? [] : [[`peak_stress_${key}_mpa`, { max: allowable }]];
   });
-  const [wall, efficiency, width, space, fingers] = ['wall', 'efficiency', 'width_mm', 'carrier_space_mm', 'fingers'].map((name) => asked(requirements, name));
+  const [wall, efficiency, width, space, fingers, safety] = ['wall', 'efficiency', 'width_mm', 'carrier_space_mm', 'fingers', 'finger_safety'].map((name) => asked(requirements, name));
   return {
     outer_diameter_mm: { max: asked(requirements, 'outer_diameter_mm') },
     torque_capacity_output_nm: { min: asked(requirements, 'output_torque_nm') },
@@ -198,6 +206,7 @@ function required(requirements, shape) {
     ...(space === undefined ? {} : { carrier_radial_space_mm: { min: space } }),
     // Of other teeth no estimate tells.
     ...(fingers === undefined || shape.name !== 'cylinder' ? {} : { carrier_finger_share: { max: fingers } }),
+    ...(safety === undefined || shape.name === 'ball' ? {} : { finger_safety: { min: safety } }),
     ...(efficiency === undefined ? {} : { efficiency_ring_fixed: { min: efficiency } }),
     ...Object.fromEntries(stresses),
     teeth_in_mesh_min: { min: LEAST_IN_MESH },
@@ -271,6 +280,7 @@ export function searchesOf(requirements) {
         drive: { wave_generator: fixed, teeth: { shape: shape.name, ...(fewest === mostSlots ? { count: fewest } : {}) } },
         load: { output_torque_nm: asked(requirements, 'output_torque_nm'), allowable_stress_mpa: asked(requirements, 'allowable_stress_mpa'), ...(speed === undefined ? {} : { input_speed_rpm: speed }) },
         model: shape.model,
+        ...(asked(requirements, 'finger_safety') === undefined || shape.name === 'ball' ? {} : { parts: { carrier: { strength: asked(requirements, 'carrier_strength') ?? STRENGTHS[0].value } } }),
         ...(rubs ? { friction: { wave_generator: { kind: 'plain', coefficient }, ring: { coefficient }, carrier: { coefficient } } } : {}),
       };
       searches.push({ label, question: { study: 'search', base, free: ranges, require: required(requirements, shape), objectives: goals, evaluations: EVALUATIONS[asked(requirements, 'effort')] } });

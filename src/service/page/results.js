@@ -95,7 +95,7 @@ const lossRows = [
   lossRow(t('result.bearing_life'), 'L_10', '', ({ bearing }) => bearing?.life_h, { significant: 3 }),
 ];
 
-const BACKINGS = ['cam_on_bore', 'housed_rim', 'free_rim', 'finger_at_both_ends', 'finger_at_one_end'];
+const BACKINGS = ['cam_on_bore', 'housed_rim', 'free_rim', 'finger_at_both_ends', 'finger_at_one_end', 'finger_joined_at_far_end', 'finger_on_web'];
 
 /** What parts behind the contacts are estimated to give way, to be taken over as series compliance. */
 const backingRows = BACKINGS.map((key) => {
@@ -119,6 +119,26 @@ const backlashRows = [
   backlashRow(t('result.backlash_most'), ({ largest_arcmin: largest }) => largest),
   ...CONTACTS.map(({ key, name }) => backlashRow(t('result.backlash_by', { part: name.toLowerCase() }), ({ contribution_arcmin: part }) => part[key])),
 ];
+
+const limitOf = ({ sweep: { torque_capacity: capacity } }) => (capacity.turns_past_teeth ? t('result.turns_past') : t(`result.limit.${capacity.limited_by}`));
+
+function heldOf({ sweep: { fingers } }) {
+  const holding = t(`result.holding.${fingers.fingers}`);
+  return fingers.is_assumed ? t('result.assumed', { holding }) : holding;
+}
+
+const safetyTile = {
+  ...row(t('result.finger_safety'), '', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
+  note: heldOf,
+  state: ({ sweep }) => (sweep.fingers.safety < 1 ? 'warning' : ''),
+  isOptional: true,
+};
+
+const capacityTile = {
+  ...row(t('result.capacity'), '', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { significant: 4 }),
+  note: (answers) => t('result.capacity_limited', { limit: limitOf(answers) }),
+  isOptional: true,
+};
 
 const backlashTile = {
   ...backlashRow(t('result.backlash'), ({ mean_arcmin: mean }) => mean),
@@ -145,6 +165,8 @@ const KEY_ROWS = [
     note: ({ sweep: { losses } }) => (losses.self_locking ? t('result.ring_fixed_locks') : t('result.ring_fixed', { percent: number(100 * losses.efficiency.ring_fixed_back_driven, 3) })),
     isOptional: true,
   }),
+  capacityTile,
+  safetyTile,
   backlashTile,
   row(t('result.undercut'), '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
     text: ({ geometry }) => (geometry.undercut.occurs ? t('result.yes') : t('result.no')),
@@ -163,17 +185,27 @@ export const GROUPS = [
   },
   {
     title: t('result.group.capacity'),
+    told: ({ sweep }) => (sweep?.torque_capacity && sweep.fingers && sweep.fingers.safety === undefined ? t('result.contacts_only') : ''),
     offer: '/load/allowable_stress_mpa',
     rows: [
       row(t('label./load/input_torque_nm'), 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
       row(t('label./load/output_torque_nm'), 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm),
       row(t('result.limited_by'), '', '', ({ sweep }) => sweep?.torque_capacity?.limited_by, {
-        text: ({ sweep }) =>
-          sweep.torque_capacity.turns_past_teeth
-            ? t('result.turns_past')
-            : CONTACTS.find(({ key }) => key === sweep.torque_capacity.limited_by).name.toLowerCase(),
+        text: limitOf,
       }),
       row(t('result.capacity_angle'), 'j', 'deg', ({ sweep }) => sweep?.torque_capacity?.input_angle_deg),
+    ],
+  },
+  {
+    title: t('result.group.fingers'),
+    offer: '/parts/carrier/strength',
+    rows: [
+      row(t('result.safety'), 'S', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
+      row(t('result.yield_safety'), 'S_F', '', ({ sweep }) => sweep?.fingers?.yield_safety, { significant: 3 }),
+      row(t('result.fatigue_safety'), 'S_D', '', ({ sweep }) => sweep?.fingers?.fatigue_safety, { significant: 3 }),
+      row(t('result.foot_stress'), 'σ', 'MPa', ({ sweep }) => sweep?.fingers?.stress_mpa, { significant: 4 }),
+      row(t('result.support'), '', '', ({ sweep }) => sweep?.fingers?.stress_mpa, { text: heldOf }),
+      row(t('result.load_along_tooth'), 'κ', '', ({ sweep }) => sweep?.fingers?.load_peak_over_mean, { significant: 3 }),
     ],
   },
   {

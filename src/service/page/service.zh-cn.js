@@ -122,6 +122,7 @@ export const SERVICE = {
     friction_beyond_measured: { detail: '摩擦超出损失已同精确平衡比较过的范围：效率只表示趋势', advice: '使离散齿通过轴承接触，或选用摩擦更小的表面' },
     efficiency_uncertain: { detail: '摩擦会改变法向力本身，一阶损失未计入：精确平衡的效率可能相差这么多', advice: '使离散齿通过轴承接触，或只把效率当作趋势' },
     bearing_load_above_half_rating: { detail: '轴承载荷超过额定动载荷的一半，即寿命公式的适用界限（ISO 281：2007）', advice: '选用额定动载荷更大的轴承，或降低转矩' },
+    finger_overstressed: { detail: '离散齿体的指在指根处屈服或疲劳', advice: '降低转矩，使指更粗、更短或两端支承，或选用更强的材料' },
     stress_above_allowable: { detail: '接触应力超过许用应力', advice: '降低转矩、加大离散齿、增加啮合齿数，或选用更强的材料' },
     stress_above_fatigue_limit: { detail: '接触应力超过轴承钢的疲劳极限（ISO 281：2007）', advice: '降低转矩、加大离散齿，或增加啮合齿数' },
     deprecated_field: { detail: '该字段已弃用：0.3 版将拒绝它', advice: '改用替代字段；toothwave convert 可转换文件' },

@@ -7,6 +7,7 @@ use crate::load_sharing::LoadedDrive;
 use crate::mesh::{Mesh, TeethInMesh};
 use crate::root::NotConverged;
 use crate::springs::WindUp;
+use crate::sweep::limited_by::LimitedBy;
 use crate::sweep::points::Points;
 use crate::tooth::point::ShearBelow;
 use crate::tooth::{Pressure, StressExponents};
@@ -179,13 +180,13 @@ pub struct PeakShear {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
 pub struct TorqueCapacity {
-    /// Largest torque at the wave generator under which no contact exceeds its allowable stress, in N·m.
+    /// Largest torque at the wave generator under which no contact exceeds its allowable stress and no finger of the
+    /// carrier its strength, in N·m.
     pub input_torque_nm: f64,
     /// The corresponding torque at the carrier, in N·m.
     pub output_torque_nm: f64,
-    /// The contact that limits it; where `turns_past_teeth`, the one that is nearest to its allowable stress.
-    #[cfg_attr(feature = "document", serde(rename = "limited_by"))]
-    pub contact: Contact,
+    /// What limits it; where `turns_past_teeth`, the contact that is nearest to its allowable stress.
+    pub limited_by: LimitedBy,
     /// True if no contact reaches its allowable stress under any torque that the teeth carry. Beyond this torque the wave
     /// generator would turn past its teeth.
     /// Left out where it does not.
@@ -217,7 +218,7 @@ impl TorqueCapacity {
         let input_torque_nm = input_torque_nm * share;
         let output_torque_nm = input_torque_nm * drive.teeth_per_wave();
         let input_angle_deg = peak.input_angle_deg;
-        Self { input_torque_nm, output_torque_nm, contact, turns_past_teeth: false, input_angle_deg }
+        Self { input_torque_nm, output_torque_nm, limited_by: contact.into(), turns_past_teeth: false, input_angle_deg }
     }
 }
 

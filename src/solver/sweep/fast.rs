@@ -937,8 +937,8 @@ impl Limit {
     fn capacity(&self, loaded: &LoadedDrive<'_>, input_angle_deg: f64) -> TorqueCapacity {
         let input_torque_nm = 1e-3 * (loaded.zones() * self.torque_nmm);
         let output_torque_nm = input_torque_nm * loaded.drive().teeth_per_wave();
-        let contact = self.contact;
-        TorqueCapacity { input_torque_nm, output_torque_nm, contact, turns_past_teeth: false, input_angle_deg }
+        let limited_by = self.contact.into();
+        TorqueCapacity { input_torque_nm, output_torque_nm, limited_by, turns_past_teeth: false, input_angle_deg }
     }
 }
 

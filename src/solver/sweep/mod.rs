@@ -3,6 +3,7 @@
 mod adaptive;
 mod columns;
 pub(crate) mod fast;
+mod limited_by;
 pub(crate) mod mean;
 mod plain;
 mod plain_look;
@@ -22,6 +23,7 @@ use adaptive::Looking;
 pub use columns::{
     ContactPeaks, Extremes, InputAngles, Peak, PeakShear, States, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity,
 };
+pub use limited_by::LimitedBy;
 pub use points::{Points, Tolerance};
 pub use unloaded::unloaded_wind_up_deg;
 

@@ -263,7 +263,7 @@ impl<'a> Growing<'a> {
                 self.torque_capacity = Some(TorqueCapacity {
                     input_torque_nm,
                     output_torque_nm,
-                    contact,
+                    limited_by: contact.into(),
                     turns_past_teeth,
                     input_angle_deg,
                 });

@@ -11,6 +11,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::materials::{MATERIALS, MaterialPreset};
+use toothwave_calculation::strengths::{STRENGTHS, StrengthPreset};
 use utoipa::ToSchema;
 
 use crate::app::App;
@@ -59,12 +60,14 @@ pub async fn examples() -> Json<ExamplesAnswer> {
 pub struct MaterialsAnswer {
     /// The materials.
     pub materials: &'static [MaterialPreset],
+    /// Strengths of carrier materials, for `parts.carrier.strength`.
+    pub strengths: &'static [StrengthPreset],
 }
 
 /// Lists materials by name, to copy into a design document. Each number has its published source.
 #[utoipa::path(get, path = "/v1/materials", tag = "service", responses((status = 200, description = "The materials.", body = MaterialsAnswer)))]
 pub async fn materials() -> Json<MaterialsAnswer> {
-    Json(MaterialsAnswer { materials: &MATERIALS })
+    Json(MaterialsAnswer { materials: &MATERIALS, strengths: &STRENGTHS })
 }
 
 /// Returns an example design document. Every endpoint accepts it unchanged.

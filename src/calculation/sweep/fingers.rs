@@ -1,0 +1,90 @@
+//! Strength of the carrier's fingers in the answer of a sweep.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use toothwave_solver::Contact;
+use toothwave_solver::fingers::{CarrierFingers, FingerStress, Fingers, Safety};
+use toothwave_solver::losses::duty::LossTotals;
+use utoipa::ToSchema;
+
+use crate::json::word;
+
+/// Strength of the carrier's fingers, under the largest force of a tooth (docs/explanation/theory.md section 4.12).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct FingersAnswer {
+    /// Support of the fingers.
+    pub fingers: Fingers,
+    /// True if `parts.carrier.fingers` is left out, so that the support is assumed.
+    pub is_assumed: bool,
+    /// Thickness of a finger across the slots, at the middle of its height, in mm.
+    pub thickness_mm: f64,
+    /// Height of a finger along the radius, in mm.
+    pub height_mm: f64,
+    /// Radius of the fillet at its foot, in mm.
+    pub fillet_radius_mm: f64,
+    /// Largest load per length along a tooth over its mean. Contact stresses grow with its square root.
+    pub load_peak_over_mean: f64,
+    /// Bending moment at the foot, in N·mm.
+    pub moment_nmm: f64,
+    /// Bending stress without the notch, in MPa.
+    pub nominal_stress_mpa: f64,
+    /// Largest stress in the fillet, in MPa.
+    pub stress_mpa: f64,
+    /// The lesser of both safeties. Only with `parts.carrier.strength`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub safety: Option<f64>,
+    /// Safety against yield, or against breaking if the material is hardened. Only with `parts.carrier.strength`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub yield_safety: Option<f64>,
+    /// Safety against fatigue. Only with `parts.carrier.strength`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub fatigue_safety: Option<f64>,
+}
+
+impl FingersAnswer {
+    pub(super) fn new(fingers: &CarrierFingers, stress: &FingerStress) -> Self {
+        let beam = fingers.beam();
+        Self {
+            fingers: fingers.fingers(),
+            is_assumed: fingers.is_assumed(),
+            thickness_mm: beam.thickness_mm,
+            height_mm: beam.height_mm,
+            fillet_radius_mm: fingers.fillet_radius_mm(),
+            load_peak_over_mean: fingers.load_peak_over_mean(),
+            moment_nmm: stress.moment_nmm,
+            nominal_stress_mpa: stress.nominal_mpa,
+            stress_mpa: stress.largest_mpa,
+            safety: stress.safety.as_ref().map(Safety::least),
+            yield_safety: stress.safety.map(|safety| safety.yielding),
+            fatigue_safety: stress.safety.map(|safety| safety.fatigue),
+        }
+    }
+
+    pub(super) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let assumed = if self.is_assumed { ", as assumed" } else { "" };
+        let support = word(&self.fingers).replace('_', " ");
+        writeln!(writer, "\nfingers of the carrier              {support}{assumed}")?;
+        writeln!(writer, "stress at their feet                {:.1} MPa", self.stress_mpa)?;
+        if let Some((yielding, fatigue)) = self.yield_safety.zip(self.fatigue_safety) {
+            writeln!(writer, "safety against yield, fatigue       {yielding:.2}, {fatigue:.2}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns losses with pressure and wear at the most loaded place along the teeth.
+pub(super) fn losses_along(fingers: &CarrierFingers, mut totals: LossTotals) -> LossTotals {
+    for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
+        if let Some(products) = &mut totals.pressure_velocity_mpa_m_per_s {
+            products.get_mut(contact).value *= fingers.stress_factor(contact);
+        }
+        if let Some(worn) = &mut totals.wear_mm_per_hour {
+            worn.get_mut(contact).value *= fingers.load_peak_over_mean();
+        }
+    }
+    totals
+}
