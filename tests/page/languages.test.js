@@ -106,6 +106,16 @@ test('views of studies are Chinese', async () => {
   }
 });
 
+test('unknown code is told in English', async () => {
+  const page = await bed.open(CHINESE);
+  const told = await page.evaluate(async () => {
+    const { detailOf, findingInWords, titleOfCode } = await import('/page/words.js');
+    const known = detailOf({ code: 'flat_too_long', detail: 'the flats are too long', value: 12, limit: 10 });
+    return [known, detailOf({ code: 'new_code', detail: 'a length of 1.23456789 mm' }), findingInWords({ code: 'new_code', detail: 'why', advice: 'what' }).advice, titleOfCode('new_code')];
+  });
+  assert.deepEqual(told, [`${SERVICE.reasons.flat_too_long}（现为 12，界限 10）`, 'a length of 1.23457 mm', 'what', 'new code']);
+});
+
 test('chosen language is remembered, the design stays', async () => {
   const page = await bed.open();
   const lang = () => page.getAttribute('html', 'lang');

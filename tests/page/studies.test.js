@@ -213,7 +213,7 @@ test('map of a million variants is thinned in drawing', async () => {
   assert.match(await page.textContent('#explore .study-state'), /1\u202f000\u202f000 variants are many/);
   const before = workers;
   await page.click('#explore button:has-text("Calculate")');
-  await page.waitForFunction(() => document.querySelector('#explore .heat-legend').textContent.includes('drawn at every third step'));
+  await page.waitForFunction(() => document.querySelector('#explore .heat-legend').textContent.includes('one step in 3 is drawn'));
   assert.ok(workers > before);
   const size = await page.$eval('#explore .heat', async (image) => {
     const drawn = new Image();

@@ -74,8 +74,9 @@ export async function evaluate(design, signal) {
   // The picture joins copies of one tooth, whatever extent the document asks for.
   const drawn = { ...design, profile: { ...design.profile, extent: 'tooth' } };
   const { answer, problem, solveMs } = await ask('v1/design', drawn, { signal, kind: 'design' });
-  const { geometry, coincidence_degree: coincidence, sweep, problems } = answer ?? { problems: { problem } };
-  return { design, answers: { zones: zonesOf(design), geometry, coincidence, sweep }, problems: Object.values(problems).map(problemInWords), solveMs: solveMs ?? 0 };
+  const { geometry, coincidence_degree: coincidence, sweep, problems = {} } = answer ?? {};
+  const told = problem ? [problem] : Object.values(problems).map(problemInWords);
+  return { design, answers: { zones: zonesOf(design), geometry, coincidence, sweep }, problems: told, solveMs: solveMs ?? 0 };
 }
 
 /** Documents that came or are under way, and how long the others are waited for. */

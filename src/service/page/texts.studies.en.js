@@ -39,7 +39,7 @@ export const STUDIES = {
     impossible: 'impossible',
     impossible_as: 'impossible – {reason}',
     not_looked_at: 'not calculated',
-    strides: 'every {count}th step is drawn',
+    strides: 'one step in {count} is drawn',
     impossible_here: 'Impossible here',
     reason: '{count} of {all}, the first at {place}: {reason}',
   },
