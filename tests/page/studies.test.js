@@ -538,11 +538,11 @@ test('deviations say they need virtual work and gaps', async () => {
   const page = await bed.open();
   await show(page, 'tolerance');
   await onlyDeviates(page, 'Depth of each ring space');
-  await page.waitForFunction(() => /by virtual work alone/.test(document.querySelector('#tolerance .study-state').textContent));
+  await page.waitForFunction(() => /need virtual work/.test(document.querySelector('#tolerance .study-state').textContent));
   await page.selectOption(field('/model/compatibility'), 'virtual_work');
   await page.waitForFunction(() => /take a while/.test(document.querySelector('#tolerance .study-state').textContent));
   await page.click('#tolerance button:has-text("Sample drives")');
-  await page.waitForFunction(() => /100 of 100 cannot be put together; clearances give their parts room/.test(document.querySelector('#tolerance .headline').textContent));
+  await page.waitForFunction(() => /100 of 100 cannot be put together: increase the clearances/.test(document.querySelector('#tolerance .headline').textContent));
 });
 
 test('changed design repeats its study', async () => {
