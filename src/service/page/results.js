@@ -345,12 +345,13 @@ export class Results {
         const cell = { entry, taken, scope, value, unit, reference, referenceUnit, delta, place };
         place?.addEventListener('click', () => onShow(cell.at));
         taken?.addEventListener('click', () => onTake(entry.taken(cell.answers)));
+        const kind = entry.text ? 'numeric words' : 'numeric';
         const line = html(
           'tr',
           { class: group.isOnScreenAlone ? 'unasked' : entry.followsFromRatio ? 'follows' : '' },
           html('th', { scope: 'row' }, entry.label, scope, entry.symbol && [' ', symbol(entry.symbol)], entry.terms && [' ', term(...entry.terms)]),
-          html('td', { class: 'numeric' }, value, unit),
-          html('td', { class: 'numeric compared' }, reference, referenceUnit),
+          html('td', { class: kind }, value, unit),
+          html('td', { class: `${kind} compared` }, reference, referenceUnit),
           [delta, html('td', { class: 'place' }, place ?? taken)],
         );
         this.#cells.push(Object.assign(cell, { line }));
