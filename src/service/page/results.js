@@ -149,35 +149,30 @@ const backlashRows = [
   ...CONTACTS.map(({ key, name }) => backlashRow(`Backlash by ${name.toLowerCase()}`, ({ contribution_arcmin: part }) => part[key])),
 ];
 
-const LIMITS = {
-  wave_generator: 'contact at the wave generator',
-  ring: 'contact at the ring',
-  carrier: 'contact at the slots',
-  finger_yield: 'yield of the carrier’s fingers',
-  finger_fatigue: 'fatigue of the carrier’s fingers',
-};
+const LIMITS = { finger_yield: 'finger yield', finger_fatigue: 'finger fatigue' };
 
-const limitOf = ({ sweep: { torque_capacity: capacity } }) => (capacity.turns_past_teeth ? 'turning past the teeth' : LIMITS[capacity.limited_by]);
+const limitOf = ({ sweep: { torque_capacity: { limited_by: limit, turns_past_teeth: turns } } }) =>
+  turns ? 'turning past the teeth' : (LIMITS[limit] ?? CONTACTS.find(({ key }) => key === limit).name.toLowerCase());
 
 const HOLDINGS = {
   held_at_one_end: 'held at one end',
   held_at_both_ends: 'held at both ends',
   far_ends_joined: 'far ends joined',
-  web_in_the_middle: 'on a web in the middle',
+  web_in_the_middle: 'on a web',
 };
 
-const heldOf = ({ sweep: { fingers } }) => `${HOLDINGS[fingers.fingers]}${fingers.is_assumed ? ', assumed' : ''}`;
+const heldOf = ({ sweep: { fingers } }) => HOLDINGS[fingers.fingers];
 
 const safetyTile = {
   ...row('Safety of the fingers', '', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
-  note: heldOf,
+  note: (answers) => `${heldOf(answers)}${answers.sweep.fingers.is_assumed ? ', assumed' : ''}`,
   state: ({ sweep }) => (sweep.fingers.safety < 1 ? 'warning' : ''),
   isOptional: true,
 };
 
 const capacityTile = {
   ...row('Torque capacity', '', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { significant: 4 }),
-  note: (answers) => `output; limited by ${limitOf(answers)}`,
+  note: (answers) => `output; limited by ${limitOf(answers)}${answers.sweep.torque_capacity.limited_by in LIMITS ? '' : ' contact'}`,
   isOptional: true,
 };
 
@@ -226,7 +221,7 @@ export const GROUPS = [
   },
   {
     title: 'Torque capacity at the allowable stress',
-    told: ({ sweep }) => (sweep?.torque_capacity && sweep.fingers && sweep.fingers.safety === undefined ? 'Contacts alone: give the strength of the carrier’s material to include its fingers.' : ''),
+    told: ({ sweep }) => (sweep?.torque_capacity && sweep.fingers && sweep.fingers.safety === undefined ? 'Without the carrier’s fingers.' : ''),
     offer: '/load/allowable_stress_mpa',
     rows: [
       row('Input torque', 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
@@ -246,7 +241,7 @@ export const GROUPS = [
       row('Safety against fatigue', 'S_D', '', ({ sweep }) => sweep?.fingers?.fatigue_safety, { significant: 3 }),
       row('Largest stress at the foot', 'σ', 'MPa', ({ sweep }) => sweep?.fingers?.stress_mpa, { significant: 4 }),
       row('Support', '', '', ({ sweep }) => sweep?.fingers?.stress_mpa, { text: heldOf }),
-      row('Load along a tooth, largest over mean', 'κ', '', ({ sweep }) => sweep?.fingers?.load_peak_over_mean, { significant: 3 }),
+      row('Load along a tooth over its mean', 'κ', '', ({ sweep }) => sweep?.fingers?.load_peak_over_mean, { significant: 3 }),
     ],
   },
   {
