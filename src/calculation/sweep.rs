@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 use toothwave_solver::backing::{Backings, Shares};
-use toothwave_solver::fingers::{CarrierFingers, FingerStress, Limited};
+use toothwave_solver::fingers::CarrierFingers;
 use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, LossParameters, LossTotals, PointLosses};
 use toothwave_solver::losses::{Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
@@ -180,47 +180,6 @@ impl CheckedSweep {
         }
         self.limited(|load| solver::peaks(&self.drive, load, self.points, stop))
     }
-
-    /// Runs a sweep whose torque capacity respects the fingers of the carrier.
-    fn limited<S: Limited>(&self, run: impl Fn(&LoadCase) -> Result<S, SolveError>) -> Result<S, SolveError> {
-        match &self.fingers {
-            Some(fingers) => fingers.limited(self.load(), run),
-            None => run(self.load()),
-        }
-    }
-
-    /// Returns the stress of the carrier's fingers, if they are calculated.
-    pub fn finger_stress(&self, peaks: &PerContact<solver::ContactPeaks>) -> Option<FingerStress> {
-        let output_torque_nm = self.load().output_torque_nm(&self.drive);
-        self.fingers.as_ref().map(|fingers| fingers.stress(peaks.carrier.force_n.value, output_torque_nm))
-    }
-
-    /// Returns the summary of a sweep with the stresses at the most loaded place along the teeth.
-    pub fn summary_along(&self, peaks: solver::SweepPeaks) -> solver::SweepPeaks {
-        match &self.fingers {
-            Some(fingers) => fingers.summary_along(peaks),
-            None => peaks,
-        }
-    }
-
-    fn losses_along(&self, totals: LossTotals) -> LossTotals {
-        match &self.fingers {
-            Some(fingers) => fingers::losses_along(fingers, totals),
-            None => totals,
-        }
-    }
-}
-
-/// Returns the fingers of the carrier, if they are calculated.
-fn checked_fingers(
-    design: &Design,
-    drive: &Drive,
-    backings: &Backings,
-    load: &LoadCase,
-) -> Result<Option<CarrierFingers>, NoAnswer> {
-    let parameters = design.finger_parameters().map_err(|violations| NoAnswer::impossible(&violations))?;
-    let fingers = backings.finger().map(|&beam| CarrierFingers::new(drive, beam, parameters, load.parameters()));
-    Ok(fingers.transpose().map_err(SolveError::from)?)
 }
 
 /// Returns the loads of a document. The hardest is already checked; the others differ from it only in torque.
@@ -287,7 +246,7 @@ impl Question for Sweep {
         let parts = design.parts_parameters()?;
         let backings = Backings::of(&drive, &draft, &parts, design.support());
         let model = design.complete_model(&load, error_of_model::has_pointed_tips(&drive));
-        let fingers = checked_fingers(design, &drive, &backings, &load)?;
+        let fingers = fingers::checked(design, &drive, &backings, &load)?;
         Ok(CheckedSweep {
             model,
             of_document: FindingAnswer::of_document(design, true),

@@ -129,9 +129,12 @@ impl Study {
     /// # Errors
     /// The same as [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
-        let document = &match document {
-            StudyDocument::Search(search) => StudyDocument::Search(search.with_default_limits()),
-            StudyDocument::Map(_) | StudyDocument::Sensitivity(_) | StudyDocument::Tolerance(_) => document.clone(),
+        let limited;
+        let document = if let StudyDocument::Search(search) = document {
+            limited = StudyDocument::Search(search.with_default_limits());
+            &limited
+        } else {
+            document
         };
         let mut study = Self::unnamed(document, limits)?;
         let resolved = match &study.kind {

@@ -382,10 +382,13 @@ fn peaks(parameters: &DriveParameters, fingers: &CarrierFingers, load: &LoadPara
 fn capacity_brings_its_limit_to_one() {
     let flat = DriveParameters { tooth: ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 3.0 }, ..PAPER_5_1 };
     let weak = Strength { yield_mpa: 200.0, tensile_mpa: 300.0, endurance_mpa: 120.0, is_hardened: false };
+    let soft = Strength { yield_mpa: 60.0, tensile_mpa: 900.0, endurance_mpa: 800.0, is_hardened: false };
     let strong = Strength { yield_mpa: 9e3, tensile_mpa: 1e4, endurance_mpa: 5e3, is_hardened: false };
     let mut seen = Vec::new();
     for (parameters, clearance_um) in [(PAPER_5_1, 0.0), (PAPER_5_1, 5.0), (flat, 0.0), (ECCENTRIC, 2.0)] {
-        for (how, strength) in HOLDINGS.into_iter().flat_map(|how| [weak, HEAT_TREATED, strong].map(|of| (how, of))) {
+        for (how, strength) in
+            HOLDINGS.into_iter().flat_map(|how| [weak, soft, HEAT_TREATED, strong].map(|of| (how, of)))
+        {
             let p = LoadParameters {
                 allowable_stress_mpa: Some(everywhere(1200.0)),
                 clearance_um: everywhere(clearance_um),

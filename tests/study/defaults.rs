@@ -58,7 +58,6 @@ fn explicit_default_keeps_the_id() {
         let mut whole = serde_json::to_value(&design).unwrap();
         whole["drive"]["teeth"]["installed"] = json!(design.drive_parameters().installed);
         whole["parts"]["ring"]["rim"] = json!("housed");
-        whole["parts"]["carrier"]["fingers"] = json!("held_at_both_ends");
         whole["model"]["refinements"] = json!("auto");
         if whole["model"]["stiffness"]["law"] == "johnson" {
             whole["model"]["stiffness"]["depth_mm"] = json!({});

@@ -93,10 +93,9 @@ pub struct PartsDocument {
 }
 
 impl PartsDocument {
-    /// Removes supports that are the default.
+    /// Removes a support that is the default. Fingers have none: left out, compliance and strength assume different ones.
     pub(super) fn leave_out_default_supports(&mut self) {
         self.ring.rim.take_if(|rim| *rim == Rim::Housed);
-        self.carrier.fingers.take_if(|fingers| *fingers == Fingers::HeldAtBothEnds);
     }
 
     /// Returns the data of the parts on which a load's answer depends: gaps, and the supports of the contacts.
@@ -170,7 +169,7 @@ pub struct CarrierPartDocument {
     pub clearance_um: f64,
     /// Support of the fingers between the slots. A sweep calculates compliance and strength from it. If they are held at
     /// one end or in the middle, contact stresses are those at the place where the load along a tooth is largest.
-    /// Default: held at both ends for the compliance, far ends joined for the strength; contact stresses are even.
+    /// Left out: held at both ends for the compliance, far ends joined for the strength; contact stresses are even.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub fingers: Option<Fingers>,

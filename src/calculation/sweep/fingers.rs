@@ -3,12 +3,17 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use toothwave_solver::Contact;
-use toothwave_solver::fingers::{CarrierFingers, FingerStress, Fingers, Safety};
+use toothwave_solver::backing::Backings;
+use toothwave_solver::fingers::{CarrierFingers, FingerStress, Fingers, Limited, Safety};
 use toothwave_solver::losses::duty::LossTotals;
+use toothwave_solver::sweep::{ContactPeaks, SweepPeaks};
+use toothwave_solver::{Contact, Drive, LoadCase, PerContact, SolveError};
 use utoipa::ToSchema;
 
+use crate::design::Design;
 use crate::json::word;
+use crate::no_answer::NoAnswer;
+use crate::sweep::CheckedSweep;
 
 /// Strength of the carrier's fingers, under the largest force of a tooth (docs/explanation/theory.md section 4.12).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
@@ -76,8 +81,54 @@ impl FingersAnswer {
     }
 }
 
+impl CheckedSweep {
+    /// Runs a sweep whose torque capacity respects the fingers of the carrier.
+    pub(super) fn limited<S: Limited>(
+        &self,
+        run: impl Fn(&LoadCase) -> Result<S, SolveError>,
+    ) -> Result<S, SolveError> {
+        match &self.fingers {
+            Some(fingers) => fingers.limited(self.load(), run),
+            None => run(self.load()),
+        }
+    }
+
+    /// Returns the stress of the carrier's fingers, if they are calculated.
+    pub fn finger_stress(&self, peaks: &PerContact<ContactPeaks>) -> Option<FingerStress> {
+        let output_torque_nm = self.load().output_torque_nm(&self.drive);
+        self.fingers.as_ref().map(|fingers| fingers.stress(peaks.carrier.force_n.value, output_torque_nm))
+    }
+
+    /// Returns the summary of a sweep with the stresses at the most loaded place along the teeth.
+    pub fn summary_along(&self, peaks: SweepPeaks) -> SweepPeaks {
+        match &self.fingers {
+            Some(fingers) => fingers.summary_along(peaks),
+            None => peaks,
+        }
+    }
+
+    pub(super) fn losses_along(&self, totals: LossTotals) -> LossTotals {
+        match &self.fingers {
+            Some(fingers) => losses_along(fingers, totals),
+            None => totals,
+        }
+    }
+}
+
+/// Returns the fingers of the carrier, if they are calculated.
+pub(super) fn checked(
+    design: &Design,
+    drive: &Drive,
+    backings: &Backings,
+    load: &LoadCase,
+) -> Result<Option<CarrierFingers>, NoAnswer> {
+    let parameters = design.finger_parameters().map_err(|violations| NoAnswer::impossible(&violations))?;
+    let fingers = backings.finger().map(|&beam| CarrierFingers::new(drive, beam, parameters, load.parameters()));
+    Ok(fingers.transpose().map_err(SolveError::from)?)
+}
+
 /// Returns losses with pressure and wear at the most loaded place along the teeth.
-pub(super) fn losses_along(fingers: &CarrierFingers, mut totals: LossTotals) -> LossTotals {
+fn losses_along(fingers: &CarrierFingers, mut totals: LossTotals) -> LossTotals {
     for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
         if let Some(products) = &mut totals.pressure_velocity_mpa_m_per_s {
             products.get_mut(contact).value *= fingers.stress_factor(contact);

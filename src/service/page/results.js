@@ -122,14 +122,11 @@ const backlashRows = [
 
 const limitOf = ({ sweep: { torque_capacity: capacity } }) => (capacity.turns_past_teeth ? t('result.turns_past') : t(`result.limit.${capacity.limited_by}`));
 
-function heldOf({ sweep: { fingers } }) {
-  const holding = t(`result.holding.${fingers.fingers}`);
-  return fingers.is_assumed ? t('result.assumed', { holding }) : holding;
-}
+const heldOf = ({ sweep: { fingers } }) => t(`result.holding.${fingers.fingers}`);
 
 const safetyTile = {
   ...row(t('result.finger_safety'), '', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
-  note: heldOf,
+  note: (answers) => (answers.sweep.fingers.is_assumed ? t('result.assumed', { holding: heldOf(answers) }) : heldOf(answers)),
   state: ({ sweep }) => (sweep.fingers.safety < 1 ? 'warning' : ''),
   isOptional: true,
 };
