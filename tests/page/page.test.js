@@ -358,7 +358,7 @@ test('form asks for further options, table answers them', async () => {
     assert.equal(await resultOf(page, label), value, label);
   }
   const limit = page.locator('#table tr', { hasText: 'Limited by' });
-  assert.match(await limit.textContent(), new RegExp(`contact at the ${capacity.limited_by.replace('_', ' ')}`));
+  assert.match(await limit.textContent(), new RegExp(capacity.limited_by.replace('_', ' ')));
   // Each value has its reference and its difference.
   await page.click('#keep');
   await enter(page, '/parts/ring/clearance_um', 8);

@@ -122,14 +122,11 @@ const backlashRows = [
 
 const limitOf = ({ sweep: { torque_capacity: capacity } }) => (capacity.turns_past_teeth ? t('result.turns_past') : t(`result.limit.${capacity.limited_by}`));
 
-function heldOf({ sweep: { fingers } }) {
-  const holding = t(`result.holding.${fingers.fingers}`);
-  return fingers.is_assumed ? t('result.assumed', { holding }) : holding;
-}
+const heldOf = ({ sweep: { fingers } }) => t(`result.holding.${fingers.fingers}`);
 
 const safetyTile = {
   ...row(t('result.finger_safety'), '', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
-  note: heldOf,
+  note: (answers) => (answers.sweep.fingers.is_assumed ? t('result.assumed', { holding: heldOf(answers) }) : heldOf(answers)),
   state: ({ sweep }) => (sweep.fingers.safety < 1 ? 'warning' : ''),
   isOptional: true,
 };
@@ -345,12 +342,13 @@ export class Results {
         const cell = { entry, taken, scope, value, unit, reference, referenceUnit, delta, place };
         place?.addEventListener('click', () => onShow(cell.at));
         taken?.addEventListener('click', () => onTake(entry.taken(cell.answers)));
+        const kind = entry.text ? 'numeric words' : 'numeric';
         const line = html(
           'tr',
           { class: group.isOnScreenAlone ? 'unasked' : entry.followsFromRatio ? 'follows' : '' },
           html('th', { scope: 'row' }, entry.label, scope, entry.symbol && [' ', symbol(entry.symbol)], entry.terms && [' ', term(...entry.terms)]),
-          html('td', { class: 'numeric' }, value, unit),
-          html('td', { class: 'numeric compared' }, reference, referenceUnit),
+          html('td', { class: kind }, value, unit),
+          html('td', { class: `${kind} compared` }, reference, referenceUnit),
           [delta, html('td', { class: 'place' }, place ?? taken)],
         );
         this.#cells.push(Object.assign(cell, { line }));
