@@ -4,9 +4,6 @@ mod list;
 mod variant;
 
 use serde::Serialize;
-use toothwave_solver::Drive;
-use toothwave_solver::backlash::Backlash;
-use toothwave_solver::losses::period::RadialForces;
 use toothwave_solver::root::NotConverged;
 use utoipa::ToSchema;
 
