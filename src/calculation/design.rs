@@ -144,13 +144,14 @@ impl Design {
         Ok(json::read::<Self>(text)?.normalised())
     }
 
-    /// Returns the document with defaults filled in, so that equal designs have equal bytes.
+    /// Returns the document in its normal form, so that equal designs have equal bytes.
     pub fn normalised(mut self) -> Self {
         if self.sweep.tolerance.is_none() {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
         }
         let drive = self.drive_parameters();
         self.deviations.leave_out_zeros(&drive);
+        self.parts.leave_out_default_supports();
         self
     }
 

@@ -11,18 +11,18 @@ use crate::quantity::Quantity;
 use crate::variant::{Domain, Template, Variable};
 
 /// Computes the id: a hash of the question and of the limits. Order of fields, spelling of numbers and explicit
-/// defaults do not change it. `inputs` are those of a sensitivity, each with its step.
+/// defaults do not change it. `resolved` are fields of the document in one form for all spellings.
 pub(crate) fn id(
     document: &StudyDocument,
     template: &Template,
     quantities: &[&'static Quantity],
-    inputs: Option<Tree>,
+    resolved: Vec<(&str, Tree)>,
     limits: &question::Limits,
 ) -> Result<Key, NoAnswer> {
     let mut asked = tree_of(document)?;
     let base = complete(&asked.remove(&["base".into()]).unwrap_or(Tree::Null))?;
-    if let Some(inputs) = inputs {
-        asked.set(&["inputs".into()], inputs);
+    for (name, value) in resolved {
+        asked.set(&[name.into()], value);
     }
     let names = [String::from("quantities")];
     if asked.at(&names).is_some() {

@@ -113,6 +113,11 @@ impl Map {
         self.axes.iter().try_fold(1_u64, |product, axis| product.checked_mul(u64::from(axis.values.count())))
     }
 
+    /// Number of values of each axis.
+    pub(crate) fn counts(&self) -> Tree {
+        Tree::Array(self.axes.iter().map(|axis| Tree::Number(axis.values.count().into())).collect())
+    }
+
     fn values(&self, mut variant: u64) -> Vec<Value> {
         let mut values: Vec<_> = self
             .axes

@@ -133,6 +133,12 @@ impl Search {
         self.evaluations
     }
 
+    /// The free values of the starts.
+    pub(crate) fn starts(&self) -> Tree {
+        let numbers = |place: &Vec<f64>| Tree::Array(place.iter().copied().map(Tree::Number).collect());
+        Tree::Array(self.start.iter().map(numbers).collect())
+    }
+
     /// Bytes of the stored fronts of all islands.
     pub(crate) fn stored_bytes(&self, quantities: usize, variables: usize) -> u64 {
         let numbers = quantities + variables + self.limits.len() + self.objectives.len();

@@ -131,8 +131,13 @@ impl Study {
     /// The same as [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
         let mut study = Self::unnamed(document, limits)?;
-        let inputs = if let Kind::Sensitivity(sensitivity) = &study.kind { Some(sensitivity.asked()) } else { None };
-        study.id = identity::id(document, &study.template, &study.evaluator.quantities, inputs, &limits.calculation)?;
+        let resolved = match &study.kind {
+            Kind::Map(map) => vec![("over", Tree::Array(vec![study.template.asked(), map.counts()]))],
+            Kind::Search(search) => vec![("free", study.template.asked()), ("start", search.starts())],
+            Kind::Sensitivity(sensitivity) => vec![("inputs", sensitivity.asked())],
+            Kind::Tolerance(_) => Vec::new(),
+        };
+        study.id = identity::id(document, &study.template, &study.evaluator.quantities, resolved, &limits.calculation)?;
         Ok(study)
     }
 

@@ -254,6 +254,18 @@ impl Template {
         Arc::clone(&self.variables)
     }
 
+    /// The free fields with their values, in one form for all spellings.
+    pub(crate) fn asked(&self) -> Tree {
+        let values = |variable: &Variable| match variable.domain {
+            Domain::Real { min, max } | Domain::Whole { min, max } => {
+                Tree::Object([("min", min), ("max", max)].map(|(end, value)| (end.into(), Tree::Number(value))).into())
+            }
+            Domain::OneOf(_) => Tree::Array(variable.choices.clone()),
+        };
+        let named = |variable: &Variable| [Tree::Text(variable.pointer.clone()), values(variable)];
+        Tree::Array(self.variables.iter().flat_map(named).collect())
+    }
+
     /// Largest size of a form in bytes: the base and the filled fields.
     fn form_bytes(&self, base: &Tree) -> usize {
         /// Bytes of an object that a path creates, without its name.

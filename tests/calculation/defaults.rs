@@ -56,6 +56,8 @@ fn defaults(document: &Value) -> Vec<(String, Value)> {
         let count = written["drive"]["teeth"]["count"].clone();
         put(&mut written, "/drive/teeth/installed", count);
     }
+    put(&mut written, "/parts/ring/rim", json!("housed"));
+    put(&mut written, "/parts/carrier/fingers", json!("held_at_both_ends"));
     put(&mut written, "/model/stiffness", serde_json::to_value(design.stiffness()).unwrap());
     let left_out = |pointer: &String| document.pointer(pointer).is_none();
     let found = leaves(&written, "").into_iter().filter(left_out);

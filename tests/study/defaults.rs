@@ -6,7 +6,7 @@ use toothwave_calculation::question::Question as _;
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::Never;
 
-use crate::asking::{CALCULATION, answer, study, with};
+use crate::asking::{CALCULATION, answer, paper, study, with};
 
 fn examples() -> [Value; 3] {
     [
@@ -57,6 +57,8 @@ fn explicit_default_keeps_the_id() {
         let design = Design::read(base.to_string().as_bytes()).unwrap();
         let mut whole = serde_json::to_value(&design).unwrap();
         whole["drive"]["teeth"]["installed"] = json!(design.drive_parameters().installed);
+        whole["parts"]["ring"]["rim"] = json!("housed");
+        whole["parts"]["carrier"]["fingers"] = json!("held_at_both_ends");
         whole["model"]["refinements"] = json!("auto");
         if whole["model"]["stiffness"]["law"] == "johnson" {
             whole["model"]["stiffness"]["depth_mm"] = json!({});
@@ -86,6 +88,44 @@ fn inputs_written_out_keep_the_id() {
         .map(|document| study(&document).unwrap().id());
         assert_eq!([ids[0]; 3], ids, "{base}");
     }
+}
+
+fn assert_same_id(short: &Value, long: &Value) {
+    assert_eq!(study(short).unwrap().id(), study(long).unwrap().id(), "{short} {long}");
+}
+
+#[test]
+fn all_whole_steps_written_out_keep_the_id() {
+    let samples = |range: Value| json!({ "study": "map", "base": paper(), "over": { "/sweep/samples": range } });
+    let steps = |steps: u64| samples(json!({ "min": 10, "max": 12, "steps": steps }));
+    let all = samples(json!({ "min": 10, "max": 12 }));
+    assert_same_id(&all, &steps(3));
+    assert_ne!(study(&all).unwrap().id(), study(&steps(2)).unwrap().id());
+}
+
+#[test]
+fn derived_free_fields_written_out_keep_the_id() {
+    let base = json!({ "drive": { "wave_generator": { "kind": "harmonic_path", "lobes": 2 } }, "load": { "output_torque_nm": 200.0 } });
+    let search = json!({
+        "study": "search", "base": base, "evaluations": 100,
+        "require": { "transmission_ratio": { "min": 19.5, "max": 20.5 }, "outer_diameter_mm": { "max": 120.0 } },
+        "objectives": [{ "quantity": "outer_diameter_mm", "goal": "min" }]
+    });
+    let found = answer(&search);
+    let range = |free: &Value| {
+        (free["pointer"].as_str().unwrap().to_owned(), json!({ "min": free["min"], "max": free["max"] }))
+    };
+    let free: Map<_, _> = found["free"].as_array().unwrap().iter().map(range).collect();
+    assert_same_id(&search, &with(&search, "/free", json!(free)));
+}
+
+#[test]
+fn only_free_values_of_starts_change_the_id() {
+    let search = &studies(&paper())[1];
+    let start = |radius_mm: f64| json!([{ "drive": { "teeth": { "radius_mm": radius_mm } } }]);
+    let started = with(search, "/start", start(4.9));
+    assert_same_id(&started, &with(search, "/start", json!([with(&paper(), "/drive/teeth/radius_mm", json!(4.9))])));
+    assert_ne!(study(&started).unwrap().id(), study(&with(search, "/start", start(4.8))).unwrap().id());
 }
 
 #[test]

@@ -91,6 +91,12 @@ pub struct PartsDocument {
 }
 
 impl PartsDocument {
+    /// Removes supports that are the default.
+    pub(super) fn leave_out_default_supports(&mut self) {
+        self.ring.rim.take_if(|rim| *rim == Rim::Housed);
+        self.carrier.fingers.take_if(|fingers| *fingers == Fingers::HeldAtBothEnds);
+    }
+
     /// Returns the data of the parts on which a load's answer depends: gaps, and the supports of the contacts.
     pub(crate) fn under_load(&self) -> impl Encode + '_ {
         let Self { wave_generator, teeth, ring, carrier } = self;

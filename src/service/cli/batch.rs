@@ -9,7 +9,7 @@ use toothwave_calculation::question::Limits;
 
 use super::Failure;
 use super::offline::{log_errors, print, progress_bar};
-use crate::http::endpoints::batch::{BatchEnd, BatchQuery, computed_line};
+use crate::http::endpoints::batch::{BatchEnd, BatchQuery, computed_line, json_line};
 
 /// Lines that are computed before the first of them is written. Whole answers are long, so there are few.
 const fn lines_at_once(query: BatchQuery, cores: usize) -> usize {
@@ -38,7 +38,7 @@ pub(super) fn run(file: &Path, query: BatchQuery) -> Result<(), Failure> {
             if chunk.is_empty() {
                 progress.finish_and_clear();
                 let end = BatchEnd { asked: index, answered: index, problem: None };
-                return writer.write_all(&end.line());
+                return writer.write_all(&json_line(&end));
             }
             progress.inc(chunk.iter().map(|line| line.len() as u64 + 1).sum());
             let documents: Vec<_> = chunk.iter().filter(|line| !line.trim_ascii().is_empty()).zip(index..).collect();

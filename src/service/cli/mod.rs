@@ -24,7 +24,6 @@ use toothwave_calculation::drawing::preset::Preset;
 use toothwave_calculation::forms::Format;
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::sweep::Sweep;
-use tracing_subscriber::EnvFilter;
 
 use crate::http::endpoints::batch::{BatchEndpoint, BatchQuery};
 use crate::http::observe::note_problem;
@@ -221,8 +220,7 @@ fn arguments() -> Vec<OsString> {
 }
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
-    let filter = EnvFilter::try_new(&settings.log).map_err(|error| Failure::BadInput(error.to_string()))?;
-    let _written_at_end = log::start(filter);
+    let _written_at_end = log::start(settings.log.clone());
     // With transparent huge pages, clearing 2 MiB for each answer of 80 KB takes a sixth of its time.
     #[cfg(target_os = "linux")]
     let _ = rustix::thread::disable_transparent_huge_pages(true);

@@ -1,6 +1,6 @@
 //! Answers one document without a server.
 
-use std::fs::File;
+use std::fs;
 use std::io::{self, Read as _, Write};
 use std::iter;
 use std::path::Path;
@@ -75,14 +75,11 @@ pub(super) fn log_errors() {
 
 /// Reads a file, or standard input for `-`.
 pub(super) fn read(file: &Path) -> Result<Vec<u8>, Failure> {
-    let mut text = Vec::new();
-    if file.as_os_str() == "-" {
-        io::stdin().read_to_end(&mut text)?;
-    } else {
-        File::open(file)
-            .and_then(|mut file| file.read_to_end(&mut text))
-            .map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))?;
+    if file.as_os_str() != "-" {
+        return fs::read(file).map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())));
     }
+    let mut text = Vec::new();
+    io::stdin().read_to_end(&mut text)?;
     Ok(text)
 }
 

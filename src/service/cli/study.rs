@@ -3,7 +3,6 @@
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -26,7 +25,7 @@ pub(super) struct StudyCommand {
     #[arg(long, value_parser = one_of(&FORMATS))]
     format: Option<Format>,
     /// Compute one of PARTS parts into `--into FOLDER`, for instance 17/200: one job of an array
-    #[arg(long, value_name = "N/PARTS", requires = "into")]
+    #[arg(long, value_name = "N/PARTS", requires = "into", value_parser = PartOf::parse)]
     part: Option<PartOf>,
     /// Folder for the files of a part; chunks that have a file are not computed again
     #[arg(long, value_name = "FOLDER", requires = "part")]
@@ -46,20 +45,15 @@ struct PartOf {
     parts: u64,
 }
 
-impl FromStr for PartOf {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let numbers =
-            text.split_once('/').and_then(|(number, parts)| Some((number.parse().ok()?, parts.parse().ok()?)));
+impl PartOf {
+    fn parse(text: &str) -> Result<Self, &'static str> {
+        let numbers = text.split_once('/').map(|(number, parts)| (number.parse(), parts.parse()));
         match numbers {
-            Some((number, parts)) if parts > 0 && number <= parts => Ok(Self { number, parts }),
+            Some((Ok(number), Ok(parts))) if parts > 0 && number <= parts => Ok(Self { number, parts }),
             _ => Err("expected N/PARTS, for instance 17/200: the part's number, from 0 or 1, and the number of parts"),
         }
     }
-}
 
-impl PartOf {
     /// Returns the chunks of this part, `parts` apart, because neighbouring chunks often take equally long.
     fn chunks(self, study: &Study) -> Vec<u64> {
         (0..study.chunks()).filter(|chunk| chunk % self.parts == self.number % self.parts).collect()

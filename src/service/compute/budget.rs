@@ -59,9 +59,9 @@ impl Budget {
         Self { free: Arc::new(Semaphore::new(permits)), max_bytes }
     }
 
-    /// The whole budget, in bytes.
-    pub const fn max_bytes(&self) -> u64 {
-        self.max_bytes
+    /// Upper bound of the bytes of an answer while it is computed and written.
+    pub fn bound(&self, max_bytes: Option<u64>) -> u64 {
+        max_bytes.unwrap_or(self.max_bytes / UNKNOWN_SIZE_DIVISOR)
     }
 
     /// Bytes that are reserved now.

@@ -15,7 +15,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use futures_util::StreamExt as _;
 use toothwave_calculation::design::Design;
-use toothwave_calculation::forms::{Format, Forms};
+use toothwave_calculation::forms::Forms;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::question::Question;
 use utoipa::IntoResponses;
@@ -23,7 +23,7 @@ use utoipa::IntoResponses;
 use super::negotiation::{self, Representation};
 use super::problem::{Problem, ProblemCode};
 use crate::app::App;
-use crate::compute::budget::{Budget, FREE_BYTES, Reservation, UNKNOWN_SIZE_DIVISOR};
+use crate::compute::budget::{Budget, FREE_BYTES, Reservation};
 use crate::compute::cache::{Answer, CacheStatus, MAX_BODY_BYTES, RequestHash};
 use crate::compute::pool::{Deadline, within};
 
@@ -228,18 +228,11 @@ async fn compute<Q: Question>(
     checked: Q::Checked,
     representation: Representation,
 ) -> Result<Answer, Problem> {
-    let reservation = app.budget.reserve(bound::<Q>(&app.budget, &checked, representation.format)).await?;
+    let bytes = app.budget.bound(Q::max_bytes(&checked, representation.format));
+    let reservation = app.budget.reserve(bytes).await?;
     let is_short = representation == Representation::JSON && reservation.is_none() && Q::is_short(&checked);
     let job = move |stop: &AtomicBool| solve::<Q>(&checked, representation, reservation, stop);
     if is_short { app.pool.run_inline(job).await } else { app.pool.run(job).await }
-}
-
-/// Upper bound of the bytes that an answer needs while it is computed and written.
-pub fn bound<Q: Question>(budget: &Budget, checked: &Q::Checked, format: Format) -> u64 {
-    match Q::max_bytes(checked, format) {
-        Some(bytes) => bytes,
-        None => budget.max_bytes() / UNKNOWN_SIZE_DIVISOR,
-    }
 }
 
 /// Computes an answer and writes its body, which holds the rest of the reservation. Fails with `too_many_states` if the

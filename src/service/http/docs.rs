@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::http::{HeaderMap, HeaderValue, header};
+use axum::response::{IntoResponse, Redirect, Response};
 use utoipa_swagger_ui_vendored::SWAGGER_UI_VENDORED;
 use zip::ZipArchive;
 
@@ -64,8 +64,8 @@ fn archived(name: &str) -> Option<Vec<u8>> {
 }
 
 /// Redirects `/docs` to the page. The address is relative, because a proxy may strip a prefix from the path.
-pub async fn redirect() -> Response {
-    (StatusCode::SEE_OTHER, [(header::LOCATION, "docs/")]).into_response()
+pub async fn redirect() -> Redirect {
+    Redirect::to("docs/")
 }
 
 /// The page itself.

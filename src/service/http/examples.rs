@@ -1,13 +1,21 @@
 //! Example design documents, compiled in from `examples/`.
 
+use serde::Serialize;
+use utoipa::ToSchema;
+
 /// An example design document.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = ExampleAnswer)]
 pub struct Example {
     /// Name in the path.
     pub name: &'static str,
     /// Short description.
     pub title: &'static str,
+    /// Path of the document.
+    pub href: &'static str,
     /// The document.
+    #[serde(skip)]
+    #[schema(ignore)]
     pub document: &'static str,
 }
 
@@ -16,6 +24,7 @@ macro_rules! examples {
         &[$(Example {
             name: $name,
             title: $title,
+            href: concat!("/v1/examples/", $name),
             document: include_str!(concat!("../../../examples/", $name, ".json")),
         }),*]
     };
@@ -33,8 +42,3 @@ pub const EXAMPLES: &[Example] = examples! {
     "balls": "Balls in grooves around an eccentric circle, by Hertz's law of point contacts",
     "flat-sided": "Case 5.1 with flat-sided teeth, which lie on the walls of their slots",
 };
-
-/// Returns the example with this name.
-pub fn by_name(name: &str) -> Option<&'static Example> {
-    EXAMPLES.iter().find(|example| example.name == name)
-}

@@ -15,7 +15,7 @@ use tracing::{Instrument, Span};
 use super::answer::Provenance;
 use super::problem::{Problem, ProblemCode};
 use crate::app::App;
-use crate::ops::metrics::{self, Labels};
+use crate::ops::metrics;
 
 /// Header with the id of a request: the client's own, or a new one.
 pub(crate) const X_REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
@@ -66,7 +66,7 @@ impl Drop for Line {
         let problem = self.problem.map(|code| word(&code));
         let elapsed_ms = 1e3 * elapsed.as_secs_f64();
         let Self { method, status, .. } = *self;
-        metrics::count_request(self.route(), Labels { method, status, cache }, elapsed);
+        metrics::count_request(self.route(), method, status, cache, elapsed);
         let left = status.is_none().then_some("client left");
         self.span.in_scope(|| {
             tracing::info!(method, route = self.route(), status, left, problem, cache, solve_ms, elapsed_ms, "request");

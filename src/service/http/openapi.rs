@@ -63,7 +63,8 @@ fn parameter_that_is_never_null(object: &mut Map<String, Value>) {
 /// Removes the default `null`, which utoipa writes, from fields that may be absent but not null. Generators reject or
 /// send it.
 fn no_null_by_default(schema: &mut Map<String, Value>) {
-    if schema.get("default") == Some(&Value::Null) && !may_be_null(schema) {
+    let may_be_null = schema.get("type").and_then(Value::as_array).is_some_and(|types| types.contains(&json!("null")));
+    if schema.get("default") == Some(&Value::Null) && !may_be_null {
         schema.remove("default");
     }
 }
@@ -84,10 +85,6 @@ fn default_words_beside_their_words(document: &mut Value) {
             words["default"] = word;
         }
     }
-}
-
-fn may_be_null(schema: &Map<String, Value>) -> bool {
-    schema.get("type").and_then(Value::as_array).is_some_and(|types| types.iter().any(|name| name == "null"))
 }
 
 /// Names the variants of every tagged union: each becomes a schema, and the tag becomes the discriminator.
@@ -176,27 +173,8 @@ fn schema_as_3_0(object: &mut Map<String, Value>) {
             object.insert(exclusive.into(), json!(true));
         }
     }
-    if let Some(value) = object.get("const").filter(|value| !value.is_object()).cloned() {
-        object.remove("const");
-        object.insert("enum".into(), json!([value]));
-    }
-    if let Some(Value::Array(examples)) = object.get("examples").cloned() {
-        object.remove("examples");
-        object.insert("example".into(), examples.into_iter().next().unwrap_or_default());
-    }
-    for word in ["propertyNames", "contentMediaType"] {
-        if object.get(word).is_some_and(|value| value.is_object() || value.is_string()) {
-            object.remove(word);
-        }
-    }
-    for choice in ["oneOf", "anyOf"] {
-        if let Some(variants) = object.get_mut(choice).and_then(Value::as_array_mut) {
-            let count = variants.len();
-            variants.retain(|variant| variant.get("type") != Some(&json!("null")));
-            if variants.len() < count {
-                object.insert("nullable".into(), json!(true));
-            }
-        }
+    if object.get("propertyNames").is_some_and(Value::is_object) {
+        object.remove("propertyNames");
     }
     // OpenAPI 3.0 ignores everything next to a reference.
     if object.len() > 1

@@ -56,103 +56,60 @@ pub struct Problem {
     pub cause: Option<String>,
 }
 
-/// Kinds of problem.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ProblemCode {
-    /// 400: the body is not JSON.
-    MalformedJson,
-    /// 400: the body is incomplete, or its coding differs from its headers.
-    BrokenBody,
-    /// 400: the query is unknown or invalid.
-    InvalidQuery,
-    /// 401: the key is missing or unknown.
-    Unauthorized,
-    /// 404: the path or the resource does not exist.
-    NotFound,
-    /// 405: the path does not support this method.
-    MethodNotAllowed,
-    /// 406: the client accepts no available representation.
-    NotAcceptable,
-    /// 408: the body did not arrive within the time limit.
-    RequestTimeout,
-    /// 413: the body exceeds `max_body_bytes`.
-    BodyTooLarge,
-    /// 415: the body is not plain JSON.
-    UnsupportedMediaType,
-    /// 421: the service listens on the loopback address, and the request has another host name.
-    MisdirectedRequest,
-    /// 422: the JSON does not have the form of the document.
-    InvalidDocument,
-    /// 422: a value is impossible for a drive, a load or a request.
-    ImpossibleDesign,
-    /// 422: at some input angle no tooth carries load.
-    NoToothInMesh,
-    /// 422: with these stiffnesses the `projection` form gives a tooth a compliance that is not positive.
-    ComplianceNotPositive,
-    /// 422: teeth interfere with a part.
-    Interference,
-    /// 422: the sweep has more states than `max_states`, or the answer exceeds the byte limit.
-    TooManyStates,
-    /// 422: the profiles have more points than `max_profile_points`.
-    TooManyPoints,
-    /// 422: the study has more variants or bytes than the limits.
-    TooManyVariants,
-    /// 503: the limit of running and waiting computations is reached.
-    QueueFull,
-    /// 503: the deadline stopped the computation.
-    DeadlineExceeded,
-    /// 503: the service is stopping.
-    ShuttingDown,
-    /// 503: the limit of open connections is reached.
-    TooManyConnections,
-    /// 503: answers that clients have not read yet hold the byte budget.
-    TooManyUnreadBytes,
-    /// 501: the service was started without studies.
-    StudiesOff,
-    /// 503: the database file of the studies cannot be read or written, for example because the disk is full.
-    StoreUnavailable,
-    /// 500: the service has an internal error.
-    InternalError,
+/// Makes the enum of the kinds of problem from one table: word, HTTP status and title.
+macro_rules! problem_codes {
+    ($($code:ident = $status:tt $title:tt,)+) => {
+        /// Kinds of problem.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+        #[serde(rename_all = "snake_case")]
+        pub enum ProblemCode {
+            $(#[doc = $title] $code,)+
+        }
+
+        impl ProblemCode {
+            const fn status_and_title(self) -> (StatusCode, &'static str) {
+                match self {
+                    $(Self::$code => (StatusCode::$status, $title),)+
+                }
+            }
+        }
+    };
+}
+
+problem_codes! {
+    MalformedJson = BAD_REQUEST "The body is not JSON",
+    BrokenBody = BAD_REQUEST "The body is incomplete",
+    InvalidQuery = BAD_REQUEST "Invalid query",
+    Unauthorized = UNAUTHORIZED "A valid key is required",
+    NotFound = NOT_FOUND "Not found",
+    MethodNotAllowed = METHOD_NOT_ALLOWED "The path does not support this method",
+    NotAcceptable = NOT_ACCEPTABLE "No acceptable representation",
+    RequestTimeout = REQUEST_TIMEOUT "The body did not arrive in time",
+    BodyTooLarge = PAYLOAD_TOO_LARGE "The body is too large",
+    UnsupportedMediaType = UNSUPPORTED_MEDIA_TYPE "Unsupported media type",
+    MisdirectedRequest = MISDIRECTED_REQUEST "Unknown host name",
+    InvalidDocument = UNPROCESSABLE_ENTITY "The document has the wrong form",
+    ImpossibleDesign = UNPROCESSABLE_ENTITY "The design is impossible",
+    NoToothInMesh = UNPROCESSABLE_ENTITY "At some input angle no tooth carries load",
+    ComplianceNotPositive = UNPROCESSABLE_ENTITY "The projection form has no solution",
+    Interference = UNPROCESSABLE_ENTITY "Teeth interfere with a part",
+    TooManyStates = UNPROCESSABLE_ENTITY "The sweep has too many states",
+    TooManyPoints = UNPROCESSABLE_ENTITY "The profiles have too many points",
+    TooManyVariants = UNPROCESSABLE_ENTITY "The study is too large",
+    QueueFull = SERVICE_UNAVAILABLE "The service is full",
+    DeadlineExceeded = SERVICE_UNAVAILABLE "The deadline stopped the computation",
+    ShuttingDown = SERVICE_UNAVAILABLE "The service is stopping",
+    TooManyConnections = SERVICE_UNAVAILABLE "Too many connections are open",
+    TooManyUnreadBytes = SERVICE_UNAVAILABLE "Too many unread bytes",
+    StudiesOff = NOT_IMPLEMENTED "This service has no studies",
+    StoreUnavailable = SERVICE_UNAVAILABLE "The study database is not available",
+    InternalError = INTERNAL_SERVER_ERROR "Internal error",
 }
 
 impl ProblemCode {
-    /// Returns the HTTP status and the title.
-    const fn status_and_title(self) -> (u16, &'static str) {
-        match self {
-            Self::MalformedJson => (400, "The body is not JSON"),
-            Self::BrokenBody => (400, "The body is incomplete"),
-            Self::InvalidQuery => (400, "Invalid query"),
-            Self::Unauthorized => (401, "A valid key is required"),
-            Self::NotFound => (404, "Not found"),
-            Self::MethodNotAllowed => (405, "The path does not support this method"),
-            Self::NotAcceptable => (406, "No acceptable representation"),
-            Self::RequestTimeout => (408, "The body did not arrive in time"),
-            Self::BodyTooLarge => (413, "The body is too large"),
-            Self::UnsupportedMediaType => (415, "Unsupported media type"),
-            Self::MisdirectedRequest => (421, "Unknown host name"),
-            Self::InvalidDocument => (422, "The document has the wrong form"),
-            Self::ImpossibleDesign => (422, "The design is impossible"),
-            Self::NoToothInMesh => (422, "At some input angle no tooth carries load"),
-            Self::ComplianceNotPositive => (422, "The projection form has no solution"),
-            Self::Interference => (422, "Teeth interfere with a part"),
-            Self::TooManyStates => (422, "The sweep has too many states"),
-            Self::TooManyPoints => (422, "The profiles have too many points"),
-            Self::TooManyVariants => (422, "The study is too large"),
-            Self::InternalError => (500, "Internal error"),
-            Self::StudiesOff => (501, "This service has no studies"),
-            Self::QueueFull => (503, "The service is full"),
-            Self::DeadlineExceeded => (503, "The deadline stopped the computation"),
-            Self::ShuttingDown => (503, "The service is stopping"),
-            Self::TooManyConnections => (503, "Too many connections are open"),
-            Self::TooManyUnreadBytes => (503, "Too many unread bytes"),
-            Self::StoreUnavailable => (503, "The study database is not available"),
-        }
-    }
-
     /// Returns the HTTP status.
-    pub fn status(self) -> StatusCode {
-        StatusCode::from_u16(self.status_and_title().0).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
+    pub const fn status(self) -> StatusCode {
+        self.status_and_title().0
     }
 
     /// Refusals: the request is valid, but the service does not answer it now, or not to this client.

@@ -88,15 +88,13 @@ pub struct Access {
 }
 
 /// Returns the API document.
-pub fn openapi_json() -> &'static str {
-    static JSON: LazyLock<String> = LazyLock::new(|| pretty(&DOCUMENT));
-    &JSON
+pub fn openapi_json() -> String {
+    pretty(&DOCUMENT)
 }
 
 /// Returns the API document in OpenAPI 3.0.3.
-pub fn openapi_3_0_json() -> &'static str {
-    static JSON: LazyLock<String> = LazyLock::new(|| pretty(&super::openapi::as_3_0(&DOCUMENT)));
-    &JSON
+pub fn openapi_3_0_json() -> String {
+    pretty(&super::openapi::as_3_0(&DOCUMENT))
 }
 
 static DOCUMENT: LazyLock<Value> = LazyLock::new(document);
@@ -181,23 +179,20 @@ pub fn router(app: Arc<App>, access: &Access) -> Router {
     with_layers(paths, app, access)
 }
 
-fn with_layers(paths: Router<Arc<App>>, app: Arc<App>, Access { cors_origins, keys, checks_host }: &Access) -> Router {
-    // Without keys there is no check. A refused request still gets the headers and the log line of the outer layers.
-    let paths = match keys {
-        Some(keys) => paths.layer(middleware::from_fn_with_state(keys.clone(), keys::require)),
-        None => paths,
-    };
-    let paths = if *checks_host { paths.layer(middleware::from_fn(require_host_of_this_machine)) } else { paths };
+fn with_layers(paths: Router<Arc<App>>, app: Arc<App>, access: &Access) -> Router {
+    let Access { cors_origins, keys, checks_host } = access;
     paths
         .layer(
             // From the outside in, as one stack: every layer of a router boxes all routes again. The inner
             // CatchPanicLayer makes a panic a problem before it is counted and logged. The outer one catches panics of
-            // the middleware itself.
+            // the middleware itself. A refused request still gets headers and a log line.
             ServiceBuilder::new()
                 .layer(CatchPanicLayer::custom(panicked))
                 .layer(middleware::from_fn_with_state(Arc::clone(&app), observe::observe))
                 .layer(option_layer((!cors_origins.is_empty()).then(|| cors(cors_origins))))
-                .layer(CatchPanicLayer::custom(panicked)),
+                .layer(CatchPanicLayer::custom(panicked))
+                .layer(option_layer(checks_host.then(|| middleware::from_fn(require_host_of_this_machine))))
+                .layer(option_layer(keys.clone().map(|keys| middleware::from_fn_with_state(keys, keys::require)))),
         )
         .with_state(app)
 }
@@ -237,8 +232,8 @@ async fn without_query(request: Request, next: Next) -> Response {
 /// The API document, its rendering in OpenAPI 3.0, and what Swagger UI shows without and with keys.
 static API_FILES: LazyLock<[StaticFile; 4]> = LazyLock::new(|| {
     let for_swagger = |wants_key| pretty(&super::openapi::for_swagger(&DOCUMENT, wants_key));
-    [openapi_json().into(), openapi_3_0_json().into(), for_swagger(false), for_swagger(true)]
-        .map(|text: String| StaticFile::new("application/json", text.into_bytes()))
+    [openapi_json(), openapi_3_0_json(), for_swagger(false), for_swagger(true)]
+        .map(|text| StaticFile::new("application/json", text))
 });
 
 async fn api_file(index: usize, headers: HeaderMap) -> Response {

@@ -19,29 +19,11 @@ use crate::compute::pool::{MAX_RUNNING_BATCHES, MAX_WAITING_REQUESTS};
 /// Memory of one computation without its answer, in bytes.
 const MEMORY_PER_SOLVE_BYTES: u64 = 128 << 20;
 
-/// Largest default size of the cache, in bytes.
-const MAX_DEFAULT_CACHE_BYTES: u64 = 256 << 20;
-
 /// Memory that is assumed if the machine does not report it, in bytes.
 const UNKNOWN_MEMORY_BYTES: u64 = 2 << 30;
 
-/// Default limit of states and of profile points.
-const MAX_DEFAULT_STATES: u64 = 1_000_000;
-
 /// Bytes of a state with its text.
 const STATE_BYTES: u64 = 350;
-
-/// Most variants of a study.
-const MAX_STUDY_VARIANTS: u64 = 10_000_000;
-
-/// Most bytes of a study with its result, and of all studies together if they are in memory.
-const MAX_STUDY_BYTES: u64 = 256 << 20;
-
-/// Most studies that run at once.
-const MAX_CONCURRENT_STUDIES: usize = 4;
-
-/// Time limit of a study.
-const STUDY_DEADLINE_MS: u64 = 3_600_000;
 
 /// Most open connections.
 pub const MAX_CONNECTIONS: usize = 1024;
@@ -112,7 +94,7 @@ pub struct Settings {
 
     /// Log filter, in the syntax of tracing-subscriber's EnvFilter
     #[arg(long, env = "TOOTHWAVE_LOG", value_name = "FILTER", default_value = "info", value_parser = log_filter)]
-    pub log: String,
+    pub log: EnvFilter,
 
     /// Settings of earlier builds
     #[command(flatten)]
@@ -224,8 +206,7 @@ impl Settings {
     fn limits_on(&self, memory_bytes: u64, cores: usize) -> Limits {
         let solves_that_fit = usize::try_from(memory_bytes / MEMORY_PER_SOLVE_BYTES).unwrap_or(usize::MAX).max(1);
         let max_unread_bytes = self.max_unread_bytes.unwrap_or(memory_bytes / 2);
-        let max_states =
-            self.max_states.unwrap_or_else(|| MAX_DEFAULT_STATES.min(max_unread_bytes / STATE_BYTES).max(1));
+        let max_states = self.max_states.unwrap_or((max_unread_bytes / STATE_BYTES).clamp(1, 1_000_000));
         Limits {
             max_states,
             max_profile_points: max_states,
@@ -234,12 +215,12 @@ impl Settings {
             max_queued_solves: MAX_WAITING_REQUESTS,
             max_concurrent_batches: MAX_RUNNING_BATCHES,
             deadline_ms: self.deadline_ms,
-            cache_max_bytes: self.cache_max_bytes.unwrap_or_else(|| MAX_DEFAULT_CACHE_BYTES.min(memory_bytes / 8)),
+            cache_max_bytes: self.cache_max_bytes.unwrap_or((memory_bytes / 8).min(256 << 20)),
             max_unread_bytes,
-            max_study_variants: MAX_STUDY_VARIANTS,
-            max_study_bytes: MAX_STUDY_BYTES.min(memory_bytes / 8),
-            max_concurrent_studies: MAX_CONCURRENT_STUDIES,
-            study_deadline_ms: STUDY_DEADLINE_MS,
+            max_study_variants: 10_000_000,
+            max_study_bytes: (memory_bytes / 8).min(256 << 20),
+            max_concurrent_studies: 4,
+            study_deadline_ms: 3_600_000,
             max_connections: MAX_CONNECTIONS,
             max_header_bytes: MAX_HEADER_BYTES,
             header_timeout_ms: CLIENT_TIMEOUT_MS,
@@ -264,8 +245,8 @@ fn origin(text: &str) -> Result<String, String> {
     }
 }
 
-fn log_filter(text: &str) -> Result<String, String> {
-    EnvFilter::try_new(text).map(|_| text.into()).map_err(|error| format!("invalid log filter: {error}"))
+fn log_filter(text: &str) -> Result<EnvFilter, String> {
+    EnvFilter::try_new(text).map_err(|error| format!("invalid log filter: {error}"))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
@@ -36,14 +36,12 @@ struct Known {
 impl Keys {
     /// Reads a keys file.
     pub fn read(path: &str) -> Result<Self, String> {
-        let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
-        Ok(Self { path: path.into(), known: Arc::new(RwLock::new(parse(&text)?)) })
+        Ok(Self { path: path.into(), known: Arc::new(RwLock::new(known_in(path.as_ref())?)) })
     }
 
     /// Reloads the keys file. If it is invalid, the keys stay the same, and the log has the reason.
     pub fn reload(&self) {
-        let read = fs::read_to_string(&self.path).map_err(|error| error.to_string()).and_then(|text| parse(&text));
-        match read {
+        match known_in(&self.path) {
             Ok(known) => {
                 tracing::info!(keys = known.len(), "reloaded the keys file");
                 *self.known.write() = known;
@@ -63,7 +61,8 @@ impl Keys {
     }
 }
 
-fn parse(text: &str) -> Result<Vec<Known>, String> {
+fn known_in(file: &Path) -> Result<Vec<Known>, String> {
+    let text = fs::read_to_string(file).map_err(|error| error.to_string())?;
     let mut keys = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.trim();

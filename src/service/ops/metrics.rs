@@ -68,19 +68,15 @@ pub fn refusals(code: ProblemCode) -> Counter {
     counter!("toothwave_refusals_total", "reason" => word(&code))
 }
 
-/// Labels of a request, apart from its route. Without a status if the client left early.
-#[derive(Debug, Clone, Copy)]
-pub struct Labels {
-    /// The method.
-    pub method: &'static str,
-    /// The status.
-    pub status: Option<u16>,
-    /// The cache status.
-    pub cache: Option<&'static str>,
-}
-
-/// Counts a request. Routes, methods and statuses are few, so there are few series.
-pub fn count_request(route: &str, Labels { method, status, cache }: Labels, elapsed: Duration) {
+/// Counts a request. Routes, methods and statuses are few, so there are few series. There is no status if the client
+/// left early.
+pub fn count_request(
+    route: &str,
+    method: &'static str,
+    status: Option<u16>,
+    cache: Option<&'static str>,
+    elapsed: Duration,
+) {
     let status = status.map_or_else(|| "none".to_owned(), |status| status.to_string());
     let route = route.to_owned();
     histogram!("toothwave_http_request_duration_seconds", "route" => route.clone()).record(elapsed);

@@ -145,12 +145,7 @@ impl StoredStudy {
         let problem: Option<String> = row.get("problem")?;
         Ok(Self {
             id: row.get("id")?,
-            state: match row.get_ref("state")?.as_str()? {
-                "running" => StudyState::Running,
-                "done" => StudyState::Done,
-                "failed" => StudyState::Failed,
-                _ => StudyState::Cancelled,
-            },
+            state: serde_json::from_value(row.get::<_, String>("state")?.into()).unwrap_or(StudyState::Cancelled),
             problem: problem
                 .and_then(|text| serde_json::from_str(&text).ok())
                 .map(|(code, detail): (_, String)| Problem::new(code, detail)),

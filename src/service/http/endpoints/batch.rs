@@ -36,7 +36,7 @@ use utoipa::ToSchema;
 use crate::app::App;
 use crate::compute::budget::{FREE_BYTES, Reservation};
 use crate::compute::pool::catch_panic;
-use crate::http::answer::{StoppableWriter, bound, broken_body, require_within, shrink_to_body, write_problem};
+use crate::http::answer::{StoppableWriter, broken_body, require_within, shrink_to_body, write_problem};
 use crate::http::negotiation;
 use crate::http::observe::note_problem;
 use crate::http::problem::{Problem, ProblemCode};
@@ -125,23 +125,18 @@ pub struct BatchEnd {
     pub problem: Option<Problem>,
 }
 
-impl BatchEnd {
-    /// Returns the line as JSON.
-    pub fn line(&self) -> Vec<u8> {
-        let mut line = serde_json::to_vec(self).unwrap_or_default();
-        line.push(b'\n');
-        line
-    }
+/// Returns a value as a line of JSON.
+pub fn json_line(value: &impl Serialize) -> Vec<u8> {
+    let mut line = serde_json::to_vec(value).unwrap_or_default();
+    line.push(b'\n');
+    line
 }
 
 /// Returns the line of a document without an answer, counts it, and logs the cause of an internal error.
 fn problem_line(index: u64, problem: Problem) -> Vec<u8> {
     count(problem.status);
     note_problem(&problem);
-    let line = BatchLine::<()> { index, status: problem.status, answer: None, problem: Some(problem) };
-    let mut text = serde_json::to_vec(&line).unwrap_or_default();
-    text.push(b'\n');
-    text
+    json_line(&BatchLine::<()> { index, status: problem.status, answer: None, problem: Some(problem) })
 }
 
 fn count(status: u16) {
@@ -159,68 +154,74 @@ fn answer_line<A: Forms>(index: u64, answer: &A, stop: &AtomicBool) -> Result<Ve
     Ok(writer.inner)
 }
 
-/// Computes the line of one document at once.
-pub fn computed_line(query: BatchQuery, index: u64, document: &[u8], limits: &Limits) -> Vec<u8> {
-    fn line<Q: Question>(question: &Q, index: u64, document: &[u8], limits: &Limits) -> Result<Vec<u8>, Problem> {
-        let never = AtomicBool::new(false);
-        answer_line(index, &question.ask(document, limits, &never)?, &never)
-    }
-    let line = catch_panic(|| match query.endpoint {
-        BatchEndpoint::Geometry => line(&Geometry, index, document, limits),
-        BatchEndpoint::CoincidenceDegree => line(&CoincidenceDegree, index, document, limits),
-        BatchEndpoint::Sweep if query.peaks_only => line(&PeaksOnly, index, document, limits),
-        BatchEndpoint::Sweep => line(&Sweep, index, document, limits),
-    });
-    line.unwrap_or_else(|problem| problem_line(index, problem))
-}
-
 /// Index and content of a line, or the reason for a missing content.
 type Line = (u64, Result<Bytes, Problem>);
 
-/// Computes the line of a large answer, which must fit into its reservation.
+/// Computes the line of an answer, which must fit into its reservation.
 type Compute = Box<dyn FnOnce(Option<&Reservation>, &AtomicBool) -> Result<Vec<u8>, Problem> + Send>;
 
-/// Outcome for one document.
-enum Outcome {
-    /// The finished line.
-    Line(Vec<u8>),
-    /// Bytes that the answer must reserve first, and the computation.
-    Large(u64, Compute),
-}
-
-/// Outcomes of one slice. They remain if the deadline ends the slice.
-#[derive(Default)]
-struct Progress {
-    current: Option<u64>,
-    outcomes: Vec<(u64, Outcome)>,
-}
-
-fn outcome<Q: Question>(
-    app: &App,
+/// Checks a document. Returns the upper bound of the answer's bytes, if it is known, and the computation.
+fn checked<Q: Question>(
     question: &Q,
     index: u64,
     document: &[u8],
-    stop: &AtomicBool,
-) -> Result<Outcome, Problem> {
-    let checked = question.check(&Design::read(document)?, &app.limits.of_calculation())?;
-    let bytes = bound::<Q>(&app.budget, &checked, Format::Json);
-    if bytes <= FREE_BYTES {
-        return answered::<Q>(index, &checked, None, stop).map(Outcome::Line);
-    }
-    Ok(Outcome::Large(bytes, Box::new(move |reservation, stop| answered::<Q>(index, &checked, reservation, stop))))
+    limits: &Limits,
+) -> Result<(Option<u64>, Compute), Problem> {
+    let checked = question.check(&Design::read(document)?, limits)?;
+    let bytes = Q::max_bytes(&checked, Format::Json);
+    let compute = move |reservation: Option<&Reservation>, stop: &AtomicBool| {
+        let answer = Q::answer(&checked, stop)?;
+        if let Some(reservation) = reservation {
+            require_within(reservation, answer.bytes(Format::Json))?;
+        }
+        answer_line(index, &answer, stop)
+    };
+    Ok((bytes, Box::new(compute)))
 }
 
-fn answered<Q: Question>(
-    index: u64,
-    checked: &Q::Checked,
-    reservation: Option<&Reservation>,
-    stop: &AtomicBool,
-) -> Result<Vec<u8>, Problem> {
-    let answer = Q::answer(checked, stop)?;
-    if let Some(reservation) = reservation {
-        require_within(reservation, answer.bytes(Format::Json))?;
+impl BatchQuery {
+    fn check(self, index: u64, document: &[u8], limits: &Limits) -> Result<(Option<u64>, Compute), Problem> {
+        match self.endpoint {
+            BatchEndpoint::Geometry => checked(&Geometry, index, document, limits),
+            BatchEndpoint::CoincidenceDegree => checked(&CoincidenceDegree, index, document, limits),
+            BatchEndpoint::Sweep if self.peaks_only => checked(&PeaksOnly, index, document, limits),
+            BatchEndpoint::Sweep => checked(&Sweep, index, document, limits),
+        }
     }
-    answer_line(index, &answer, stop)
+}
+
+/// Computes the line of one document at once.
+pub fn computed_line(query: BatchQuery, index: u64, document: &[u8], limits: &Limits) -> Vec<u8> {
+    let line = catch_panic(|| query.check(index, document, limits)?.1(None, &AtomicBool::new(false)));
+    line.unwrap_or_else(|problem| problem_line(index, problem))
+}
+
+/// A part of the response: finished lines and their number, or a large answer that must reserve bytes first.
+enum Part {
+    Lines(Vec<u8>, u64),
+    Large { index: u64, bytes: u64, compute: Compute },
+}
+
+/// Progress of one slice. It remains if the deadline ends the slice.
+#[derive(Default)]
+struct Progress {
+    current: Option<u64>,
+    done: usize,
+    parts: Vec<Part>,
+}
+
+impl Progress {
+    /// Adds the part of one document. Lines are joined.
+    fn push(&mut self, part: Part) {
+        self.done += 1;
+        match (part, self.parts.last_mut()) {
+            (Part::Lines(line, added), Some(Part::Lines(lines, count))) => {
+                lines.extend_from_slice(&line);
+                *count += added;
+            }
+            (part, _) => self.parts.push(part),
+        }
+    }
 }
 
 /// Answers lines until the slice has used its time or its bytes.
@@ -228,25 +229,22 @@ fn answer_lines(app: &App, query: BatchQuery, lines: Vec<Line>, progress: &Mutex
     let (started, mut bytes) = (Instant::now(), 0);
     for (index, document) in lines {
         progress.lock().current = Some(index);
-        let outcome = catch_panic(|| match (document, query.endpoint) {
-            (Err(problem), _) => Err(problem),
-            (Ok(document), BatchEndpoint::Geometry) => outcome(app, &Geometry, index, &document, stop),
-            (Ok(document), BatchEndpoint::CoincidenceDegree) => {
-                outcome(app, &CoincidenceDegree, index, &document, stop)
+        let part = catch_panic(|| {
+            let (bound, compute) = query.check(index, &document?, &app.limits.of_calculation())?;
+            let bytes = app.budget.bound(bound);
+            if bytes > FREE_BYTES {
+                return Ok(Part::Large { index, bytes, compute });
             }
-            (Ok(document), BatchEndpoint::Sweep) if query.peaks_only => {
-                outcome(app, &PeaksOnly, index, &document, stop)
-            }
-            (Ok(document), BatchEndpoint::Sweep) => outcome(app, &Sweep, index, &document, stop),
+            Ok(Part::Lines(compute(None, stop)?, 1))
         });
         let mut progress = progress.lock();
         // `slice` reports a line that the deadline has ended.
         if stop.load(Ordering::Relaxed) || progress.current.take() != Some(index) {
             return;
         }
-        let outcome = outcome.unwrap_or_else(|problem| Outcome::Line(problem_line(index, problem)));
-        bytes += if let Outcome::Line(line) = &outcome { line.len() } else { 0 };
-        progress.outcomes.push((index, outcome));
+        let part = part.unwrap_or_else(|problem| Part::Lines(problem_line(index, problem), 1));
+        bytes += if let Part::Lines(line, _) = &part { line.len() } else { 0 };
+        progress.push(part);
         if started.elapsed() >= SLICE || bytes >= SLICE_BYTES {
             return;
         }
@@ -262,8 +260,8 @@ async fn in_task<T: Send + 'static>(
     task.await.unwrap_or_else(|panic| Err(Problem::internal(&panic)))
 }
 
-/// Computes one slice. Returns the outcomes of its lines (at least one) and the remaining lines.
-async fn slice(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (Vec<(u64, Outcome)>, Vec<Line>) {
+/// Computes one slice. Returns the parts of its lines (at least one) and the remaining lines.
+async fn slice(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (Vec<Part>, Vec<Line>) {
     let progress = Arc::new(Mutex::new(Progress::default()));
     let (shared, waiting) = (Arc::clone(&progress), lines.clone());
     let computation = async move {
@@ -276,18 +274,17 @@ async fn slice(app: Arc<App>, query: BatchQuery, mut lines: Vec<Line>) -> (Vec<(
     };
     let result = in_task(computation).await;
     let mut progress = progress.lock();
-    let mut outcomes = std::mem::take(&mut progress.outcomes);
     if let Err(problem) = result {
         // The problem belongs to the current line, or to the first line if none has begun, as when the service stops.
         // So every slice answers at least one line, and every batch ends.
-        let next = lines.get(outcomes.len()).map(|(index, _)| *index).filter(|_| outcomes.is_empty());
+        let next = lines.first().map(|(index, _)| *index).filter(|_| progress.done == 0);
         if let Some(index) = progress.current.take().or(next) {
-            outcomes.push((index, Outcome::Line(problem_line(index, problem))));
+            progress.push(Part::Lines(problem_line(index, problem), 1));
         }
     }
-    // Lines are answered in order: the outcomes are those of the first lines.
-    lines.drain(..outcomes.len());
-    (outcomes, lines)
+    // Lines are answered in order: the parts are those of the first lines.
+    lines.drain(..progress.done);
+    (std::mem::take(&mut progress.parts), lines)
 }
 
 /// Computes the line of a large answer. The line holds its reservation.
@@ -304,28 +301,6 @@ async fn answer_large_line(app: Arc<App>, index: u64, bytes: u64, compute: Compu
     line.await.unwrap_or_else(|problem| problem_line(index, problem).into())
 }
 
-/// A part of the response: finished lines, or one line that must be computed.
-enum Part {
-    Lines(u64, Vec<u8>),
-    Large(u64, u64, Compute),
-}
-
-/// Joins short lines. A large line is a part of its own.
-fn parts(outcomes: Vec<(u64, Outcome)>) -> Vec<Part> {
-    let mut parts = Vec::new();
-    for (index, outcome) in outcomes {
-        match (outcome, parts.last_mut()) {
-            (Outcome::Line(line), Some(Part::Lines(count, lines))) => {
-                lines.extend_from_slice(&line);
-                *count += 1;
-            }
-            (Outcome::Line(line), _) => parts.push(Part::Lines(1, line)),
-            (Outcome::Large(bytes, compute), _) => parts.push(Part::Large(index, bytes, compute)),
-        }
-    }
-    parts
-}
-
 /// Returns the lines of a body that are not blank. If the body ends early, the problem goes to `end`.
 fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<Item = Line> {
     let limit = app.limits.max_body_bytes;
@@ -335,42 +310,34 @@ fn lines(app: Arc<App>, body: Body, end: Arc<Mutex<BatchEnd>>) -> impl Stream<It
     stream::unfold(FramedRead::new(reader, codec), move |mut framed| {
         let (app, end) = (Arc::clone(&app), Arc::clone(&end));
         async move {
-            loop {
-                let next = tokio::select! {
-                    next = tokio::time::timeout(Duration::from_millis(CLIENT_TIMEOUT_MS), framed.next()) => next,
+            let line = loop {
+                let problem = tokio::select! {
+                    next = tokio::time::timeout(Duration::from_millis(CLIENT_TIMEOUT_MS), framed.next()) => match next {
+                        Ok(None) => return None,
+                        Ok(Some(Ok(line))) if line.trim_ascii().is_empty() => continue,
+                        Ok(Some(Ok(line))) => break Ok(Bytes::copy_from_slice(line.trim_ascii())),
+                        Ok(Some(Err(AnyDelimiterCodecError::MaxChunkLengthExceeded))) => {
+                            // After this error the stream ends once; the next poll continues after the line.
+                            framed.next().await;
+                            let detail = format!("the line has more than {limit} bytes (`max_body_bytes`). Shorten it");
+                            break Err(Problem::new(ProblemCode::BodyTooLarge, detail));
+                        }
+                        Ok(Some(Err(AnyDelimiterCodecError::Io(error)))) => broken_body(&error),
+                        Err(_) => {
+                            let detail = format!("no line arrived for {CLIENT_TIMEOUT_MS} ms. Send the remaining lines again");
+                            Problem::new(ProblemCode::RequestTimeout, detail)
+                        }
+                    },
                     () = app.pool.stopped() => {
-                        end.lock().problem = Some(Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Send the remaining lines again"));
-                        return None;
+                        Problem::new(ProblemCode::ShuttingDown, "the service is stopping. Send the remaining lines again")
                     }
                 };
-                let line = match next {
-                    Ok(None) => return None,
-                    Ok(Some(Ok(line))) if line.trim_ascii().is_empty() => continue,
-                    Ok(Some(Ok(line))) => Ok(Bytes::copy_from_slice(line.trim_ascii())),
-                    Ok(Some(Err(AnyDelimiterCodecError::MaxChunkLengthExceeded))) => {
-                        // After this error the stream ends once; the next poll continues after the line.
-                        framed.next().await;
-                        let detail = format!("the line has more than {limit} bytes (`max_body_bytes`). Shorten it");
-                        Err(Problem::new(ProblemCode::BodyTooLarge, detail))
-                    }
-                    Ok(Some(Err(AnyDelimiterCodecError::Io(error)))) => {
-                        end.lock().problem = Some(broken_body(&error));
-                        return None;
-                    }
-                    Err(_) => {
-                        let detail =
-                            format!("no line arrived for {CLIENT_TIMEOUT_MS} ms. Send the remaining lines again");
-                        end.lock().problem = Some(Problem::new(ProblemCode::RequestTimeout, detail));
-                        return None;
-                    }
-                };
-                let index = {
-                    let mut end = end.lock();
-                    end.asked += 1;
-                    end.asked - 1
-                };
-                return Some(((index, line), framed));
-            }
+                end.lock().problem = Some(problem);
+                return None;
+            };
+            let index = end.lock().asked;
+            end.lock().asked += 1;
+            Some(((index, line), framed))
         }
     })
 }
@@ -386,19 +353,19 @@ fn answers(app: Arc<App>, query: BatchQuery, body: Body) -> impl Stream<Item = B
     let first = chunks.map(move |lines| slice(Arc::clone(&first_app), query, lines)).buffered(at_once);
     let slices = first.flat_map(move |first| {
         let app = Arc::clone(&next_app);
-        stream::unfold((first, app), move |((mut outcomes, mut rest), app)| async move {
-            if outcomes.is_empty() && !rest.is_empty() {
-                (outcomes, rest) = slice(Arc::clone(&app), query, rest).await;
+        stream::unfold((first, app), move |((mut parts, mut rest), app)| async move {
+            if parts.is_empty() && !rest.is_empty() {
+                (parts, rest) = slice(Arc::clone(&app), query, rest).await;
             }
-            (!outcomes.is_empty()).then(|| (outcomes, ((Vec::new(), rest), app)))
+            (!parts.is_empty()).then(|| (parts, ((Vec::new(), rest), app)))
         })
     });
-    let finished = slices.flat_map(|outcomes| stream::iter(parts(outcomes))).map(move |part| {
+    let finished = slices.flat_map(stream::iter).map(move |part| {
         let app = Arc::clone(&large_app);
         async move {
             match part {
-                Part::Lines(count, lines) => (count, lines.into()),
-                Part::Large(index, bytes, compute) => (1, answer_large_line(app, index, bytes, compute).await),
+                Part::Lines(lines, count) => (count, lines.into()),
+                Part::Large { index, bytes, compute } => (1, answer_large_line(app, index, bytes, compute).await),
             }
         }
     });
@@ -407,7 +374,7 @@ fn answers(app: Arc<App>, query: BatchQuery, body: Body) -> impl Stream<Item = B
         part
     });
     // The last line is made after all other lines were sent.
-    parts.chain(stream::once(async move { ending.lock().line().into() }))
+    parts.chain(stream::once(async move { json_line(&*ending.lock()).into() }))
 }
 
 /// Reads the first bytes of a body, or all of it.

@@ -14,7 +14,7 @@ use toothwave_calculation::materials::{MATERIALS, MaterialPreset};
 use utoipa::ToSchema;
 
 use crate::app::App;
-use crate::http::examples::{self, EXAMPLES};
+use crate::http::examples::{EXAMPLES, Example};
 use crate::http::problem::{Problem, ProblemCode};
 use crate::ops::config::Limits;
 use crate::ops::metrics;
@@ -29,29 +29,13 @@ pub async fn limits(State(app): State<Arc<App>>) -> Json<Limits> {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct ExamplesAnswer {
     /// The examples.
-    pub examples: Vec<ExampleAnswer>,
-}
-
-/// An example design document.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct ExampleAnswer {
-    /// Name in the path.
-    pub name: &'static str,
-    /// Short description.
-    pub title: &'static str,
-    /// Path of the document.
-    pub href: String,
+    pub examples: &'static [Example],
 }
 
 /// Lists the example design documents.
 #[utoipa::path(get, path = "/v1/examples", tag = "service", responses((status = 200, description = "The examples.", body = ExamplesAnswer)))]
 pub async fn examples() -> Json<ExamplesAnswer> {
-    let examples = EXAMPLES.iter().map(|example| ExampleAnswer {
-        name: example.name,
-        title: example.title,
-        href: format!("/v1/examples/{}", example.name),
-    });
-    Json(ExamplesAnswer { examples: examples.collect() })
+    Json(ExamplesAnswer { examples: EXAMPLES })
 }
 
 /// List of the named materials.
@@ -81,7 +65,7 @@ pub async fn materials() -> Json<MaterialsAnswer> {
 pub async fn example(name: Result<Path<String>, PathRejection>) -> Response {
     // A path segment that is not UTF-8 is an unknown name.
     let name = name.map(|Path(name)| name).unwrap_or_default();
-    match examples::by_name(&name) {
+    match EXAMPLES.iter().find(|example| example.name == name) {
         Some(example) => ([(header::CONTENT_TYPE, "application/json")], example.document).into_response(),
         None => {
             let names: Vec<_> = EXAMPLES.iter().map(|example| example.name).collect();
