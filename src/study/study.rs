@@ -11,9 +11,10 @@ use requirements::{
 };
 use serde::{Deserialize, Serialize};
 use toothwave_calculation::field::FieldCode;
+use toothwave_calculation::json::{self, Tree};
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
-use toothwave_calculation::{json, question};
+use toothwave_calculation::question;
 
 use crate::ask::beyond;
 use crate::document::StudyDocument;
