@@ -153,7 +153,7 @@ impl Drive {
     /// assert_eq!(drive.transmission_ratio(), 14.0);
     ///
     /// // Neighbouring teeth touch.
-    /// let thick = DriveParameters { tooth_radius_mm: 7.0, ..DriveParameters::default() };
+    /// let thick = DriveParameters { tooth_radius_mm: 8.0, ..DriveParameters::default() };
     /// let Err(DriveError::Impossible(violations)) = Drive::new(&thick) else { panic!() };
     /// println!("{}", violations[0]);
     /// ```

@@ -49,7 +49,7 @@
 //! let load = LoadCase::new(&LoadParameters { torque: Torque::Output(280.0), ..LoadParameters::default() }).unwrap();
 //! let sweep = sweep(&drive, &load, Points::samples(200).unwrap(), &Never).unwrap();
 //! let peak = sweep.peaks.wave_generator.stress_mpa;
-//! assert_eq!(format!("{:.0} MPa", peak.value), "? MPa");
+//! assert_eq!(format!("{:.0} MPa", peak.value), "864 MPa");
 //! ```
 //!
 //! | to compute | use |
