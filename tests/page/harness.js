@@ -106,7 +106,7 @@ export function testBed({ before, after, afterEach }, settings = []) {
 }
 
 /** What the page opens on: the drive of an example, with limits of steel. */
-export const firstDesign = ({ drive, load }) => ({ drive, load: { ...load, allowable_stress_mpa: 1500 }, parts: { carrier: { strength: '42crmo4-qt' } } });
+export const firstDesign = ({ drive, load }) => ({ drive, load: { ...load, allowable_stress_mpa: 1500 }, parts: { carrier: { strength: '42crmo4-qt' } }, sweep: { wind_up: true } });
 
 /** A page that remembers what must not happen: errors, violations of its policy, requests to elsewhere. */
 /** It opens on a link to an example, or, with `example: null`, as a new user meets it. */

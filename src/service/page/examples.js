@@ -25,7 +25,7 @@ export class Examples {
     const loaded = await Promise.all(examples.map(async ({ name, title, href }) => ({ name, title: SERVICE.examples?.[name] ?? title, design: await getJson(href.slice(1)) })));
     const { drive, load } = (loaded.find(({ name }) => name === FIRST_DRIVE) ?? loaded[0]).design;
     const { allowable_stress_mpa, strength } = STEEL_LIMITS;
-    const design = { drive, load: { ...load, allowable_stress_mpa }, parts: { carrier: { strength } } };
+    const design = { drive, load: { ...load, allowable_stress_mpa }, parts: { carrier: { strength } }, sweep: { wind_up: true } };
     this.#all = [{ name: 'first', title: t('design.first'), design }, ...loaded];
   }
 
