@@ -169,7 +169,7 @@ pub struct CarrierPartDocument {
     pub clearance_um: f64,
     /// Support of the fingers between the slots. A sweep calculates compliance and strength from it. If they are held at
     /// one end or in the middle, contact stresses are those at the place where the load along a tooth is largest.
-    /// Left out: held at both ends for the compliance, far ends joined for the strength; contact stresses are even.
+    /// Left out: the compliance is that of fingers held at both ends, the strength that of joined far ends, and the load along a tooth is even.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub fingers: Option<Fingers>,

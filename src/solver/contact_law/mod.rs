@@ -1,7 +1,7 @@
 //! Contact laws, one file for each (docs/explanation/theory.md section 4.3).
 //!
-//! To add a law, add a file that implements [`Law`]. Then add its lines to [`ContactLaw`], [`LawName`] and
-//! [`ContactLaw::law`] below. Approach, slope, inverse and load sharing follow from its [`Term`].
+//! To add a law, add a file that implements `Law`. Then add its lines to [`ContactLaw`], [`LawName`] and
+//! `ContactLaw::law` below. Approach, slope, inverse and load sharing follow from its `Term`.
 
 mod fixed;
 mod hertz;
