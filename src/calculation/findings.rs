@@ -349,10 +349,17 @@ impl Text {
                 "choose a bearing with a larger load rating, or lower the torque",
             ),
             Code::FingerOverstressed => text(
-                &["/parts/carrier/strength", "/parts/carrier/fingers", LOAD, WIDTH, RADIUS],
+                &[
+                    "/parts/carrier/strength",
+                    "/parts/carrier/fingers",
+                    "/parts/carrier/finger_fillet_radius_mm",
+                    LOAD,
+                    WIDTH,
+                    RADIUS,
+                ],
                 "",
                 "the safety of the carrier's fingers is below 1: they yield or break by fatigue at their feet",
-                "lower the torque, hold the fingers at both ends, make them thicker or shorter, or choose a stronger material",
+                "lower the torque, hold the fingers at both ends, make them thicker or shorter, enlarge their fillets, or choose a stronger material",
             ),
             Code::StressAboveAllowable => text(
                 &[&["/load/allowable_stress_mpa"], stressed, &[&*mate]].concat(),

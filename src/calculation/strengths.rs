@@ -49,11 +49,11 @@ const fn steel(
 
 /// All of them.
 pub const STRENGTHS: [StrengthPreset; 7] = [
-    steel("42crmo4-qt", "42CrMo4 +QT, up to 16 mm thick", [900.0, 1100.0, 495.0], HEAT_TREATED_ALLOY),
-    steel("42crmo4-qt-40", "42CrMo4 +QT, 16 to 40 mm thick", [750.0, 1000.0, 450.0], HEAT_TREATED_ALLOY),
-    steel("42crmo4-qt-100", "42CrMo4 +QT, 40 to 100 mm thick", [650.0, 900.0, 405.0], HEAT_TREATED_ALLOY),
-    steel("c45-qt", "C45 +QT, up to 16 mm thick", [490.0, 700.0, 315.0], HEAT_TREATED_CARBON),
-    steel("c45-n", "C45 +N, up to 16 mm thick", [340.0, 620.0, 279.0], HEAT_TREATED_CARBON),
+    steel("42crmo4-qt", "42CrMo4 +QT, bar up to 16 mm in diameter", [900.0, 1100.0, 495.0], HEAT_TREATED_ALLOY),
+    steel("42crmo4-qt-40", "42CrMo4 +QT, bar of 16 to 40 mm", [750.0, 1000.0, 450.0], HEAT_TREATED_ALLOY),
+    steel("42crmo4-qt-100", "42CrMo4 +QT, bar of 40 to 100 mm", [650.0, 900.0, 405.0], HEAT_TREATED_ALLOY),
+    steel("c45-qt", "C45 +QT, bar up to 16 mm in diameter", [490.0, 700.0, 315.0], HEAT_TREATED_CARBON),
+    steel("c45-n", "C45 +N, bar up to 16 mm in diameter", [340.0, 620.0, 279.0], HEAT_TREATED_CARBON),
     StrengthPreset {
         name: "100cr6",
         title: "100Cr6, hardened, tempered at 200 °C",

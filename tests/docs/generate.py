@@ -185,7 +185,7 @@ def design_document(document):
         rows = [["field", "unit", "allowed", "default", "meaning"]]
         old, fields = [], []
         for path, schema, is_required in document.rows(design["properties"][name], f"/{name}"):
-            if schema.get("deprecated") or path.startswith("/model/clearance"):
+            if schema.get("deprecated"):
                 old.append(f"`{path}`")
             else:
                 fields.append((path, schema, is_required, (unit(path), allowed(document, schema), default(schema, is_required))))

@@ -275,7 +275,7 @@ class Spreadsheet(OfDrive):
     def rows(self):
         """By their first cell; findings, which may share it, by number."""
         sheet, rows = self.document.Results, {}
-        for number in range(1, 60):
+        for number in range(1, sheet.Rows + 1):
             row = [sheet.get(f"{c}{number}") if sheet.getContents(f"{c}{number}") else "" for c in "ABCDEFGH"]
             rows[number if row[0] in ("info", "warning", "") else row[0]] = row
         return rows

@@ -310,14 +310,15 @@ fn load_runs_to_foot_of_paper_cases() {
         assert_eq!(fingers(&PAPER_5_1, parameters, &johnson(1.0)).load_peak_over_mean(), 1.0);
     }
     let web = fingers(&PAPER_5_1, held(Fingers::WebInTheMiddle), &johnson(1.0)).load_peak_over_mean();
-    assert!((1.0..1.3).contains(&web), "{web}");
+    assert!((1.15..1.19).contains(&web), "{web}");
 }
 
 #[test]
 fn slice_compliance_is_that_of_whole_contacts() {
-    // At the steepest place the tangent of the drive's own law, by differences of two loads.
     let (p, drive) = (johnson(1.0), drive(&PAPER_5_1));
     let found = slice_compliance_mm2_per_n(&drive, &p).unwrap();
+    // By hand from the formulas of Johnson's approach at the steepest place.
+    assert!((found / 2.73e-4 - 1.0).abs() < 5e-3, "{found:e}");
     let fixed = LoadParameters { law: ContactLaw::Fixed(everywhere(1e6)), ..p };
     assert_eq!(slice_compliance_mm2_per_n(&drive, &fixed).unwrap(), found);
     let soft = Material { youngs_modulus_gpa: 105.0, ..Material::STEEL };
@@ -332,7 +333,8 @@ fn stress_concentration_follows_table() {
         assert!((stress_concentration(radius) - expected).abs() < 1e-12);
     }
     let between = stress_concentration(0.12);
-    assert!((1.68..1.91).contains(&between) && stress_concentration(0.02) > 3.0 && stress_concentration(5.0) == 1.0);
+    assert!((stress_concentration(5.0) - 1.54).abs() < 1e-12);
+    assert!((1.68..1.91).contains(&between) && stress_concentration(0.02) > 3.0);
 }
 
 #[test]

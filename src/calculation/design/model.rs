@@ -22,7 +22,7 @@ pub struct ModelDocument {
     /// Compatibility: relation of the approaches at a tooth's contacts. Default: `virtual_work`.
     #[serde(default)]
     pub compatibility: Compatibility,
-    /// The contact law; left out, `hertz` of balls, of other teeth `johnson`, and `linear` beside `projection`.
+    /// The contact law; left out, `hertz` of balls, of other teeth `johnson`, and `linear` with `projection`.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub stiffness: Option<StiffnessDocument>,
@@ -56,13 +56,13 @@ pub struct ModelDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct ClearanceDocument {
     /// Gap at the wave generator, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, deprecated)]
     pub wave_generator_um: f64,
     /// Gap at the ring, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, deprecated)]
     pub ring_um: f64,
     /// Gap at the carrier, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, deprecated)]
     pub carrier_um: f64,
 }
 
@@ -159,7 +159,7 @@ impl PartialSchema for SeriesComplianceDocument {
     fn schema() -> RefOr<Schema> {
         OneOfBuilder::new()
             .description(Some(
-                "What stands behind each contact and gives way too: numbers, or `estimated` for those of \
+                "Compliance of the support at each contact: numbers, or `estimated` for those of \
                  `series_compliance_estimates` whose parts are held so.",
             ))
             .item(ObjectBuilder::new().schema_type(Type::String).enum_values(Some([ESTIMATED])))

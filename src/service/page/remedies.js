@@ -13,13 +13,13 @@ const unbored = { label: t('remedy.unbored'), change: (design) => changed(design
 const virtualWork = { label: t('remedy.virtual_work'), change: withVirtualWork };
 const johnson = { label: t('remedy.johnson'), change: (design) => changed(withVirtualWork(design), '/model/stiffness', { law: 'johnson' }) };
 
-/** The share of a part behind the contacts that it is estimated to yield, as series compliance. */
+/** The estimated compliance of a part as it is held, as series compliance. */
 const backing = (contact, ...backings) => (_, { sweep }) => {
-  const found = sweep?.series_compliance_estimates?.find((estimate) => backings.includes(estimate.backing));
+  const found = sweep?.series_compliance_estimates?.find(({ backing: of, is_as_held: isAsHeld }) => isAsHeld && backings.includes(of));
   return found && { label: t('remedy.compliance'), change: (design) => changed(withVirtualWork(design), `/model/series_compliance_mm_per_n/${contact}`, Number(found.compliance_mm_per_n.toPrecision(3))) };
 };
 
-/** The torque at which the first contact reaches its allowable stress, at the shaft where the design gives it. */
+/** The torque capacity, at the shaft where the design gives its torque. */
 function capacity(_, { sweep }, design) {
   const key = ['input_torque_nm', 'output_torque_nm'].find((name) => at(design, `/load/${name}`) !== undefined);
   const torque = key && sweep?.torque_capacity?.[key];

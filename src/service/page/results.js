@@ -182,7 +182,7 @@ export const GROUPS = [
   },
   {
     title: t('result.group.capacity'),
-    told: ({ sweep }) => (sweep?.torque_capacity && sweep.fingers && sweep.fingers.safety === undefined ? t('result.contacts_only') : ''),
+    told: ({ sweep }) => (sweep?.torque_capacity && sweep.fingers?.safety === undefined ? t('result.contacts_only') : ''),
     offer: '/load/allowable_stress_mpa',
     rows: [
       row(t('label./load/input_torque_nm'), 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),

@@ -48,7 +48,7 @@ export const RESULTS = {
     critical: 'critical r {radius} mm',
     capacity: 'Torque capacity',
     capacity_limited: 'output; limited by {limit}',
-    contacts_only: 'Without the carrier’s fingers.',
+    contacts_only: 'The carrier’s fingers are not among these limits.',
     limit: { wave_generator: 'wave generator contact', ring: 'ring contact', carrier: 'carrier contact', finger_yield: 'finger yield', finger_fatigue: 'finger fatigue' },
     finger_safety: 'Safety of the fingers',
     holding: { held_at_one_end: 'held at one end', held_at_both_ends: 'held at both ends', far_ends_joined: 'far ends joined', web_in_the_middle: 'on a web' },

@@ -48,7 +48,7 @@ export const RESULTS = {
     critical: '临界 r {radius} mm',
     capacity: '转矩容量',
     capacity_limited: '输出端；限制因素：{limit}',
-    contacts_only: '未计离散齿体的指。',
+    contacts_only: '这些限值不含离散齿体的指。',
     limit: { wave_generator: '波发生器处接触', ring: '刚轮处接触', carrier: '槽处接触', finger_yield: '指屈服', finger_fatigue: '指疲劳' },
     finger_safety: '指的安全系数',
     holding: { held_at_one_end: '一端支承', held_at_both_ends: '两端支承', far_ends_joined: '另一端相连', web_in_the_middle: '中间腹板支承' },

@@ -28,6 +28,10 @@ impl Limited for SweepPeaks {
 /// Share of the torque to which a capacity that depends on itself is found.
 const PRECISION: f64 = 1e-12;
 
+/// Width of the bracket, as a share of the torque, at which its lower end is taken: a sweep to a tolerance may jump
+/// within it.
+const NARROW: f64 = 1e-9;
+
 /// Limit of sweeps for such a capacity. Two suffice if contacts limit it, four if loads are proportional to the torque.
 const MAX_SWEEPS: u32 = 60;
 
@@ -76,6 +80,9 @@ impl CarrierFingers {
                 return Ok(swept);
             }
             torque_nm = bracket.next(torque_nm, found_nm);
+            if bracket.high_nm - bracket.low_nm <= NARROW * bracket.high_nm {
+                return Ok(under(bracket.high_nm)?.0);
+            }
         }
         Err(NotConverged {
             what: "torque capacity of the fingers",

@@ -62,10 +62,12 @@ impl Strength {
 /// Young, R. G. Budynas, *Roark's Formulas for Stress and Strain*, table 17.1, for a step of 20 radii.
 const SHOULDER: [(f64, f64); 4] = [(0.05, 2.39), (0.1, 1.91), (0.15, 1.68), (0.2, 1.54)];
 
-/// Returns that stress concentration: powers of the radius between the table's places and beyond them, at least 1.
+/// Returns that stress concentration: powers of the radius between the table's places and below them. Above them it is
+/// that of the largest radius, since the table says nothing of larger ones.
 pub fn stress_concentration(fillet_over_thickness: f64) -> f64 {
+    let fillet_over_thickness = fillet_over_thickness.min(SHOULDER[3].0);
     let at = SHOULDER[1..3].iter().filter(|(radius, _)| *radius < fillet_over_thickness).count();
     let [(radius, factor), (next_radius, next_factor)] = [SHOULDER[at], SHOULDER[at + 1]];
     let power = (next_factor / factor).ln() / (next_radius / radius).ln();
-    (factor * (fillet_over_thickness / radius).powf(power)).max(1.0)
+    factor * (fillet_over_thickness / radius).powf(power)
 }

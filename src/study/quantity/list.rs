@@ -354,7 +354,7 @@ pub static QUANTITIES: [Quantity; 61] = [
         "carrier_finger_share",
         "",
         "Deflection of a carrier finger over the deflection of a tooth at its contacts. 0 without an estimate. Above 0.2 there is a finding.",
-        Source::Definition("the `share` of the finger with its actual support among `/series_compliance_estimates` of the sweep, 0 if it is absent"),
+        Source::Definition("the `share` of the finger with its support (both ends if not given) among `/series_compliance_estimates` of the sweep, 0 if it is absent"),
         |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.mean_peaks).unwrap_or(0.0))),
     )
     .not_below_zero(),
