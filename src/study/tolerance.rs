@@ -163,6 +163,12 @@ impl Tolerance {
                     detail,
                 ));
             }
+            let is_of_it =
+                |pointer: &&String| pointer.split('/').nth(2) == Some(name) && pointer.starts_with("/deviations/");
+            if let Some(pointer) = document.inputs.keys().find(is_of_it) {
+                let detail = format!("`deviations/{name}` of the study draws this too. Remove one");
+                return Err(fault(&format!("/inputs/{}", escaped(pointer)), FieldCode::ConflictingFields, detail));
+            }
             let place = match name.as_str() {
                 "tooth_radius_um" | "slot_angle_arcsec" | "slot_wall_um" => Place::Items { path, count: items.slots },
                 "ring_space_um" | "ring_space_angle_arcsec" => Place::Items { path, count: items.ring_spaces },

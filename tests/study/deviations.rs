@@ -389,6 +389,9 @@ fn deviations_of_impossible_base_are_refused_beforehand() {
     taking["base"].as_object_mut().unwrap().remove("model");
     let moved = json!({ "study": "sensitivity", "base": paper(), "quantities": ["slot_wall_mm"] });
     let count = json!({ "/drive/teeth/count": { "distribution": "uniform", "limit": 1.0 } });
+    let runout = json!({ "ring_runout": { "distribution": "uniform", "limit": 8.0 } });
+    let amount = json!({ "/deviations/ring_runout/amount_um": { "distribution": "uniform", "limit": 1.0 } });
+    let drawn_twice = with(&with(&taking, "/deviations", runout), "/inputs", amount);
     for (document, at, code) in [
         // The paper's model does not support deviations.
         (drawn.clone(), "/deviations", "conflicting_fields"),
@@ -400,6 +403,7 @@ fn deviations_of_impossible_base_are_refused_beforehand() {
             "conflicting_fields",
         ),
         (with(&taking, "/inputs", count), "/inputs/~1drive~1teeth~1count", "wrong_type"),
+        (drawn_twice, "/inputs/~1deviations~1ring_runout~1amount_um", "conflicting_fields"),
         (with(&taking, "/quantities", json!(["undercut", "undercut"])), "/quantities/1", "conflicting_fields"),
         (with(&moved, "/quantities", json!(["undercut", "undercut"])), "/quantities/1", "conflicting_fields"),
     ] {
