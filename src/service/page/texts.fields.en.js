@@ -228,7 +228,7 @@ export const FIELDS = {
     no_bore: 'no bore',
     outer_radius: '1.2 × root',
     tenth_free: 'tenth free',
-    fillet: 'tenth of thickness',
+    fillet: 'thickness/10',
     one_ratio: 'single ratio',
     no_lower: 'same limit',
   },

@@ -220,7 +220,7 @@ export const FIELDS = {
     no_bore: '无内孔',
     outer_radius: '1.2 × 齿根',
     tenth_free: '留十分之一',
-    fillet: '厚度的十分之一',
+    fillet: '厚度的 1/10',
     one_ratio: '仅此值',
     no_lower: '不更低',
   },
