@@ -47,14 +47,14 @@ static std::shared_ptr<Design> design(double tooth_radius_mm) {
 int main(int, char** arguments) {
   auto connection = std::make_shared<HttpClientImpl>(arguments[1], arguments[2]);
   DriveApi api(connection);
-  auto answer = api.sweep(design(5.0), "");
+  auto answer = api.sweep(design(5.0), boost::none, "");
   std::cout << std::setprecision(12) << answer->getPeaks().getWaveGenerator().getForceN().getValue() << '\n';
 
-  auto tooth = api.drawing(std::make_shared<DrawnPart>("tooth"), design(5.0), "");
+  auto tooth = api.drawing(std::make_shared<DrawnPart>("tooth"), design(5.0), boost::none, "");
   require(std::holds_alternative<OutlineAnswerCircle>(tooth->getBodies().at(0).getOuter()), "a cylinder's outline is a circle");
 
   try {
-    api.sweep(design(-1.0), "");
+    api.sweep(design(-1.0), boost::none, "");
     require(false, "a negative radius is refused");
   } catch (const DriveApiException& refusal) {
     Problem problem;
