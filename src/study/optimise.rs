@@ -5,10 +5,10 @@
 //! Journal of Global Optimization 11, 1997, 341-359). One is simulated binary crossover with polynomial mutation (K.
 //! Deb, R. B. Agrawal, Complex Systems 9, 1995, 115-148; K. Deb, M. Goyal, Computer Science and Informatics 26, 1996,
 //! 30-45). Once there is a front, half of the steps are differential evolution among near points of it (H. Li, Q. Zhang,
-//! IEEE Transactions on Evolutionary Computation 13, 2009, 284-302). Limits are handled as by K. Deb (IEEE Transactions on Evolutionary Computation 6, 2002, 182-197): a
-//! feasible point beats an infeasible one, and the smaller violation beats the larger one. An archive keeps the
-//! non-dominated points, and most steps start there. Each kind of step alone finds less in as many steps
-//! (benches/results/searches.md).
+//! IEEE Transactions on Evolutionary Computation 13, 2009, 284-302). Limits are handled as by K. Deb (the same journal
+//! 6, 2002, 182-197): a feasible point beats an infeasible one, and the smaller violation beats the larger one. An
+//! archive keeps the non-dominated points, and most steps start there. Each kind of step alone finds less in as many
+//! steps (benches/results/searches.md).
 //!
 //! If half of the evaluations found no feasible point, each limit gets its own population. There the smaller violation
 //! of the other limits is better, then the smaller violation of this limit.

@@ -28,8 +28,8 @@ impl Limited for SweepPeaks {
 /// Share of the torque to which a capacity that depends on itself is found.
 const PRECISION: f64 = 1e-12;
 
-/// Width of the bracket, as a share of the torque, at which its lower end is taken: a sweep to a tolerance may jump
-/// within it.
+/// Width of the bracket, as a share of the torque, at which the search ends: a sweep to a tolerance may jump within it.
+/// The result is the capacity at the upper end, the smaller one.
 const NARROW: f64 = 1e-9;
 
 /// Limit of sweeps for such a capacity. Two suffice if contacts limit it, four if loads are proportional to the torque.
@@ -97,7 +97,7 @@ impl CarrierFingers {
         self.moment_nmm_per_nm > 0.0 && self.parameters.strength.is_some()
     }
 
-    /// Returns the stress of the slot's contact under the largest force that a finger bears beside the torque.
+    /// Returns the stress of the slot's contact under the largest force that a finger bears together with the torque.
     fn slot_limit_mpa(&self, output_torque_nm: f64) -> f64 {
         let Some(strength) = self.parameters.strength else { return f64::INFINITY };
         let (yielding_mpa, fatigue_mpa) = self.nominal_limits_mpa(&strength);

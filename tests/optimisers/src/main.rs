@@ -12,7 +12,8 @@ use toothwave_solver::{
     WaveGenerator,
 };
 
-use crate::optimise::{Judged, Optimiser, Plan, Point};
+use crate::optimise::{Optimiser, Plan};
+use crate::point::{Judged, Point};
 
 // The product's own files, without all that stands around them.
 #[allow(dead_code, reason = "objectives are two here")]
@@ -21,6 +22,9 @@ mod front;
 #[allow(dead_code, reason = "what a search merges is not asked for here")]
 #[path = "../../../src/study/optimise.rs"]
 mod optimise;
+#[allow(dead_code, reason = "memory is not asked for here")]
+#[path = "../../../src/study/point.rs"]
+mod point;
 #[allow(dead_code, reason = "the normal distribution is not asked for here")]
 #[path = "../../../src/study/random.rs"]
 mod random;
