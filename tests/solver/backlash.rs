@@ -142,6 +142,11 @@ fn a_turned_carrier_moves_the_zero_alone() {
     let plain = with_gap(&PAPER_5_1, everywhere(10.0));
     assert!((turned.mean_rad / plain.mean_rad - 1.0).abs() < 1e-9);
     assert!((turned.smallest.backlash_rad / plain.smallest.backlash_rad - 1.0).abs() < 1e-9);
+    let gapless = LoadParameters { modification, ..with_clearance(PerContact::default()) };
+    let found = of(&PAPER_5_1, &gapless, &Deviations::default()).unwrap();
+    for backlash_rad in [found.mean_rad, found.smallest.backlash_rad, found.largest.backlash_rad] {
+        assert!(backlash_rad.abs() < 1e-12 * ARCSEC * 20.0, "{backlash_rad:e}");
+    }
 }
 
 #[test]

@@ -12,8 +12,22 @@ const SMOOTH: f64 = 3e-4;
 /// Steps of a golden-section search. They shrink the bracket by 4e-9, so the minimum is exact to all digits.
 const SECTIONS: u32 = 40;
 
-/// Relative gain over the extreme found so far that counts as rounding.
+/// Part of the closing angles that counts as rounding. The angles of the two sides may cancel each other.
 const ROUNDING: f64 = 1e-12;
+
+/// Backlash at one fraction of a lap.
+#[derive(Clone, Copy)]
+struct Value {
+    of_contact_rad: PerContact<f64>,
+    /// Differences below this are rounding.
+    rounding_rad: f64,
+}
+
+impl Value {
+    fn rad(&self) -> f64 {
+        sum(&self.of_contact_rad)
+    }
+}
 
 /// First teeth in front of the lobes and behind them.
 pub(super) struct Pair<'a> {
@@ -24,10 +38,14 @@ pub(super) struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    fn at(&self, fraction: f64) -> Result<PerContact<f64>, NotConverged> {
+    fn at(&self, fraction: f64) -> Result<Value, NotConverged> {
         let front = self.front.closing(self.teeth[0], fraction)?;
         let behind = self.behind.closing(self.teeth[1], fraction)?;
-        Ok(PerContact::of(|contact| front.get(contact) + behind.get(contact)))
+        let angles_rad = front.iter().chain(behind.iter()).map(|(_, angle)| angle.abs());
+        Ok(Value {
+            of_contact_rad: PerContact::of(|contact| front.get(contact) + behind.get(contact)),
+            rounding_rad: ROUNDING * angles_rad.sum::<f64>(),
+        })
     }
 
     /// Adds the integral and the extremes between two fractions of the lap.
@@ -39,29 +57,31 @@ impl Pair<'_> {
         &self,
         start: f64,
         end: f64,
-        [at_start, at_end]: [PerContact<f64>; 2],
+        [at_start, at_end]: [Value; 2],
         found: &mut Found,
     ) -> Result<(), NotConverged> {
         let middle = start.midpoint(end);
         let at_middle = self.at(middle)?;
-        let ends = PerContact::of(|contact| 0.5 * (at_start.get(contact) + at_end.get(contact)));
-        let bend = |contact| (ends.get(contact) - at_middle.get(contact)).abs() * (2.0 / 3.0);
-        let scale: f64 = at_middle.iter().map(|(_, part)| part.abs()).sum();
-        let is_smooth = ends.iter().all(|(contact, _)| bend(contact) <= SMOOTH * scale);
+        let [from, to, between] = [at_start, at_end, at_middle].map(|value| value.of_contact_rad);
+        let ends = PerContact::of(|contact| 0.5 * (from.get(contact) + to.get(contact)));
+        let bend = |contact| (ends.get(contact) - between.get(contact)).abs() * (2.0 / 3.0);
+        let scale: f64 = between.iter().map(|(_, part)| part.abs()).sum();
+        let accepted_rad = (SMOOTH * scale).max(at_middle.rounding_rad);
+        let is_smooth = ends.iter().all(|(contact, _)| bend(contact) <= accepted_rad);
         // The rest of so short a stretch is negligible.
         if !is_smooth && end - start > MARGIN {
             self.halve(start, middle, [at_start, at_middle], found)?;
             return self.halve(middle, end, [at_middle, at_end], found);
         }
         found.integral_rad = PerContact::of(|contact| {
-            let mean_rad = (ends.get(contact) + 2.0 * at_middle.get(contact)) / 3.0;
+            let mean_rad = (ends.get(contact) + 2.0 * between.get(contact)) / 3.0;
             found.integral_rad.get(contact) + mean_rad * (end - start)
         });
-        let values_rad = [sum(&at_start), sum(&at_middle), sum(&at_end)];
-        for (fraction, value_rad) in [start, middle, end].into_iter().zip(values_rad) {
-            found.see(self.lap as f64 + fraction, value_rad);
+        let values = [at_start, at_middle, at_end];
+        for (fraction, value) in [start, middle, end].into_iter().zip(values) {
+            found.see(self.lap as f64 + fraction, value.rad());
         }
-        self.look_for_extremes(start, end, values_rad, found)
+        self.look_for_extremes(start, end, values, found)
     }
 
     /// Searches a stretch for an extreme if a parabola through its values predicts one.
@@ -69,16 +89,16 @@ impl Pair<'_> {
         &self,
         start: f64,
         end: f64,
-        values_rad: [f64; 3],
+        values: [Value; 3],
         found: &mut Found,
     ) -> Result<(), NotConverged> {
         for sign in [1.0, -1.0] {
-            let signed = values_rad.map(|value| sign * value);
+            let signed = values.map(|value| sign * value.rad());
             let Some((_, least)) = vertex(signed) else { continue };
             let nearest = signed.into_iter().fold(f64::INFINITY, f64::min);
             let best = if sign > 0.0 { found.smallest.1 } else { -found.largest.1 };
             // The parabola's error can be as large as its own prediction.
-            if least - (nearest - least) < best - ROUNDING * best.abs() {
+            if least - (nearest - least) < best - values[1].rounding_rad {
                 self.sections(start, end, sign, found)?;
             }
         }
@@ -90,7 +110,7 @@ impl Pair<'_> {
         let (mut low, mut high) = (start, end);
         for _ in 0..SECTIONS {
             let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-            let [at_left, at_right] = [sum(&self.at(left)?), sum(&self.at(right)?)];
+            let [at_left, at_right] = [self.at(left)?.rad(), self.at(right)?.rad()];
             found.see(self.lap as f64 + left, at_left);
             found.see(self.lap as f64 + right, at_right);
             if sign * at_left < sign * at_right { high = right } else { low = left }
