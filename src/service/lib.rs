@@ -11,3 +11,5 @@ pub mod http;
 pub mod ops;
 pub mod page;
 pub mod studies;
+#[cfg(unix)]
+pub mod unix;

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use rusqlite::Connection;
 use serde_json::{Value, json};
+use tokio::sync::OnceCell;
 
 use crate::asking::{Answer, LIMITS, Limits, Question, Service, ask_at};
 use crate::designs::shortest;
@@ -89,7 +90,7 @@ fn map(steps: u64) -> Value {
 }
 
 /// Returns a study that runs for a while.
-fn long() -> Value {
+pub(crate) fn long() -> Value {
     let mut study = map(300);
     study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 300 });
     study
@@ -103,9 +104,10 @@ fn result(study: &Value) -> String {
     format!("{}/result", place(study))
 }
 
-/// Returns the result of an undisturbed study.
-async fn undisturbed_result(study: &Value) -> Value {
-    Service::new().ask(&waiting(study)).await.found()["result"].clone()
+/// Returns the result of the long study when nothing disturbs it.
+pub(crate) async fn undisturbed_result() -> &'static Value {
+    static RESULT: OnceCell<Value> = OnceCell::const_new();
+    RESULT.get_or_init(async || Service::new().ask(&waiting(&long())).await.found()["result"].clone()).await
 }
 
 fn start_at(process: &Process, study: &Value) -> Value {
@@ -162,7 +164,7 @@ async fn killed_service_continues_with_same_bits() {
     let stands = once(&process, &study, |stands| stands["state"] != "running");
     assert_eq!((&stands["state"], &stands["looked_at"]), (&json!("done"), &json!(90_000)));
     let found = ask_at(process.address, &Question::of("GET", &result(&study))).found();
-    assert!(found == undisturbed_result(&long()).await);
+    assert!(found == *undisturbed_result().await);
 }
 
 /// A limit on file size acts like a full disk.
@@ -183,7 +185,7 @@ async fn full_disk_fails_only_the_study() {
     process.ended();
     let keeper = Keeper::of(&file);
     assert_eq!(keeper.0.get(&result(&small)).await.found(), small["result"]);
-    assert!(keeper.wait_for(&long()).await["result"] == undisturbed_result(&long()).await);
+    assert!(keeper.wait_for(&long()).await["result"] == *undisturbed_result().await);
     keeper.end();
 }
 
@@ -239,7 +241,7 @@ async fn cancelled_study_continues_after_restart() {
     keeper.end();
     let keeper = Keeper::of(&file);
     assert_eq!(keeper.0.get(&place(&study)).await.found(), cancelled);
-    assert!(keeper.wait_for(&long()).await["result"] == undisturbed_result(&long()).await);
+    assert!(keeper.wait_for(&long()).await["result"] == *undisturbed_result().await);
     assert_eq!(keeper.delete(&study).await, 204);
     keeper.0.get(&place(&study)).await.refused(404, "not_found");
     keeper.end();

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use crate::asking::{Answer, ENDLESS, LIMITS, Limits, Question, Service};
 use crate::designs::{every_number, shortest, spelled_out, undercut, with};
 use crate::openapi::document;
+use crate::stored::{long, undisturbed_result};
 
 const WAIT: &str = "wait=600";
 
@@ -18,13 +19,6 @@ fn map(base: &Value, steps: u64) -> Value {
         "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": steps } },
         "quantities": ["peak_stress_ring_mpa", "undercut"]
     })
-}
-
-/// Returns a study that runs for a while.
-fn long() -> Value {
-    let mut study = map(&shortest(), 300);
-    study["over"]["/load/input_torque_nm"] = json!({ "min": 10.0, "max": 20.0, "steps": 300 });
-    study
 }
 
 /// Returns a study with this many variants, each slower than any test.
@@ -131,7 +125,7 @@ async fn cancelled_study_continues_when_requested_again() {
     assert_eq!(partial["is_complete"], false);
     let found = wait_for(&service, &long()).await;
     assert_eq!((&found["id"], &found["state"], &found["looked_at"]), (&study["id"], &json!("done"), &json!(90_000)));
-    assert!(found["result"] == wait_for(&Service::new(), &long()).await["result"]);
+    assert!(found["result"] == *undisturbed_result().await);
     // A study that no longer runs is deleted.
     assert_eq!(delete(&service, &place(&study)).await, 204);
     service.get(&place(&study)).await.refused(404, "not_found");

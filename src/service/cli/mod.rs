@@ -12,9 +12,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
-use rustix::process::Signal;
 use tokio::runtime::Builder;
-use tokio::signal::unix::{SignalKind, signal};
 use toothwave_calculation::accuracy::Accuracy;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::convert::converted;
@@ -31,6 +29,7 @@ use crate::http::problem::Problem;
 use crate::http::{router, server};
 use crate::ops::config::Settings;
 use crate::ops::{keys, log};
+use crate::unix::{outlive_file_size_limit, use_small_pages};
 use offline::{FORMATS, PARTS, answer, one_of, print, read};
 
 /// Exit status for bad input: 2, as in most tools.
@@ -221,13 +220,10 @@ fn arguments() -> Vec<OsString> {
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let _written_at_end = log::start(settings.log.clone());
-    // With transparent huge pages, clearing 2 MiB for each answer of 80 KB takes a sixth of its time.
-    #[cfg(target_os = "linux")]
-    let _ = rustix::thread::disable_transparent_huge_pages(true);
+    use_small_pages();
     let runtime = Builder::new_multi_thread().enable_all().build()?;
     let result = runtime.block_on(async {
-        // With this handler, a log file at its size limit is an I/O error and does not kill the process.
-        let _ignored = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()))?;
+        outlive_file_size_limit()?;
         server::serve(settings).await
     });
     // A computation after its time limit must not delay the exit.

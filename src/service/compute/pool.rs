@@ -21,6 +21,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::Span;
 
 use crate::http::problem::{Problem, ProblemCode};
+use crate::unix::lower_priority;
 
 /// Most requests that wait for a permit.
 pub const MAX_WAITING_REQUESTS: usize = 32;
@@ -52,8 +53,7 @@ impl Workers {
             let waiting = Arc::clone(&waiting);
             thread::Builder::new().name(format!("{name}-{number}")).spawn(move || {
                 if nice > 0 {
-                    // Linux applies this to the thread. If it fails, background threads have normal priority.
-                    let _ = rustix::process::nice(nice);
+                    lower_priority(nice);
                 }
                 loop {
                     let next = waiting.lock().recv();

@@ -19,11 +19,8 @@ use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
-use rustix::process::{Resource, getrlimit, setrlimit};
-use socket2::SockRef;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{sleep, timeout};
 use tokio_util::sync::CancellationToken;
@@ -34,6 +31,7 @@ use crate::app::App;
 use crate::ops::config::{CLIENT_TIMEOUT_MS, MAX_CONNECTIONS, MAX_HEADER_BYTES, Settings, StudiesPlace};
 use crate::ops::metrics;
 use crate::studies::{Storage, Store};
+use crate::unix::{StopSignals, hang_ups, limit_unsent_time, raise_file_limit};
 
 /// Shortest time for which the service still listens after it reports that it is not ready.
 const NOTICE: Duration = Duration::from_millis(200);
@@ -54,13 +52,7 @@ const REFUSAL: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: appli
 pub async fn serve(settings: &Settings) -> io::Result<()> {
     metrics::install();
     // First: without a handler, process 1 of a container ignores signals.
-    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
-    let mut stop_signal = async || {
-        tokio::select! {
-            _ = terminate.recv() => {}
-            _ = interrupt.recv() => {}
-        }
-    };
+    let mut stop_signals = StopSignals::new()?;
     raise_file_limit();
     let listener = TcpListener::bind(settings.listen)
         .await
@@ -77,12 +69,12 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     });
     watch_keys(settings)?;
     let stopping = async {
-        stop_signal().await;
+        stop_signals.recv().await;
         tracing::info!("stopping: not ready, still listening");
         app.ready.store(false, Ordering::Relaxed);
         tokio::select! {
             () = sleep(NOTICE.max(Duration::from_millis(settings.lame_duck_ms))) => false,
-            () = stop_signal() => true,
+            () = stop_signals.recv() => true,
         }
     };
     let has_second_signal = tokio::select! {
@@ -94,7 +86,7 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
         drop(listener);
         tokio::select! {
             () = server.finish(&app, Duration::from_millis(settings.shutdown_ms)) => {}
-            () = stop_signal() => tracing::warn!("second signal: running requests are aborted"),
+            () = stop_signals.recv() => tracing::warn!("second signal: running requests are aborted"),
         }
     }
     tracing::info!("stopped");
@@ -118,20 +110,13 @@ fn study_storage(settings: &Settings) -> io::Result<Option<Storage>> {
 /// Reloads the keys file at each SIGHUP.
 fn watch_keys(settings: &Settings) -> io::Result<()> {
     let Some(keys) = settings.keys_file.clone() else { return Ok(()) };
-    let mut hang_up = signal(SignalKind::hangup())?;
+    let mut hang_up = hang_ups()?;
     tokio::spawn(async move {
         while hang_up.recv().await.is_some() {
             keys.reload();
         }
     });
     Ok(())
-}
-
-/// Raises the limit of open files to the maximum. On failure it stays.
-fn raise_file_limit() {
-    let mut files = getrlimit(Resource::Nofile);
-    files.current = files.maximum;
-    let _ = setrlimit(Resource::Nofile, files);
 }
 
 struct Server {
@@ -192,8 +177,7 @@ impl Server {
     fn handle(&self, stream: TcpStream) {
         // Without `TCP_NODELAY` small responses may wait for the acknowledgement of earlier ones.
         let _ = stream.set_nodelay(true);
-        #[cfg(target_os = "linux")]
-        let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(Duration::from_millis(CLIENT_TIMEOUT_MS)));
+        limit_unsent_time(&stream, Duration::from_millis(CLIENT_TIMEOUT_MS));
         match Arc::clone(&self.connection_permits).try_acquire_owned() {
             Ok(permit) => self.serve_connection(stream, permit),
             Err(_) => {

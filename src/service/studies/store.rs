@@ -1,8 +1,6 @@
 //! The database of studies: an SQLite file that one process opens at a time, or a database in memory.
 
 use std::collections::HashSet;
-use std::fs::OpenOptions;
-use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -20,6 +18,7 @@ use toothwave_study::Study;
 use super::state::{Progress, StudyState};
 use crate::http::problem::{Problem, ProblemCode};
 use crate::ops::config::Limits;
+use crate::unix::create_private;
 
 /// Marks a database as a study database: "toth".
 const APPLICATION_ID: i64 = 0x746f_7468;
@@ -197,7 +196,7 @@ impl Store {
         let mut connection = match file {
             Some(file) => {
                 // Other users must not read the file. If this fails, SQLite reports why.
-                let _ = OpenOptions::new().append(true).create(true).mode(0o600).open(file);
+                let _ = create_private(file);
                 Connection::open_with_flags(file, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE)?
             }
             None => Connection::open_in_memory()?,
