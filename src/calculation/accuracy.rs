@@ -38,7 +38,8 @@ pub struct AccuracyAnswer {
     pub solver_version: &'static str,
     /// Build of the program. Equal builds on equal processors give equal bytes.
     pub build: &'static str,
-    /// The design's own model with all defaults. As the document's `model` it gives the same answer.
+    /// The design's own model with all defaults. As the document's `model` it gives the same answer. Instead of
+    /// deprecated switches it has `refinements`.
     pub model: ModelDocument,
     /// Requested relative error.
     pub requested_error: f64,
@@ -137,7 +138,7 @@ impl Question for Accuracy {
                 let (deviations, max_states) = (Deviations::from(&design.deviations), limits.max_searched_states);
                 let backings = Backings::of(&drive, &draft, &design.parts_parameters()?, design.support());
                 let has_pointed_tips = model_error::has_pointed_tips(&drive);
-                let model = design.complete_model(&load, has_pointed_tips);
+                let model = design.complete_model(has_pointed_tips);
                 let refinements = design.refinements_by_virtual_work(has_pointed_tips);
                 Ok(CheckedAccuracy {
                     drive,

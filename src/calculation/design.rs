@@ -155,6 +155,9 @@ impl Design {
         let drive = self.drive_parameters();
         self.deviations.leave_out_zeros(&drive);
         self.parts.leave_out_default_supports();
+        if let Some(friction) = &mut self.friction {
+            friction.leave_out_zero_wear();
+        }
         self
     }
 

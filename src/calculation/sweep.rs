@@ -243,7 +243,7 @@ impl Question for Sweep {
         let with_gaps = load.has_gaps() || !deviations.is_nil();
         let parts = design.parts_parameters()?;
         let backings = Backings::of(&drive, &draft, &parts, design.support());
-        let model = design.complete_model(&load, error_of_model::has_pointed_tips(&drive));
+        let model = design.complete_model(error_of_model::has_pointed_tips(&drive));
         let fingers = fingers::checked(design, &drive, &backings, &load)?;
         Ok(CheckedSweep {
             model,

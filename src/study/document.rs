@@ -101,7 +101,7 @@ impl<'de> Deserialize<'de> for Base {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct MapDocument {
-    /// The design that is varied.
+    /// The design that is varied. Its values of the varied fields are ignored.
     pub base: Base,
     /// The varied fields, by JSON pointer into the design.
     pub over: BTreeMap<String, OverDocument>,
@@ -185,7 +185,7 @@ impl From<&ChoiceDocument> for Tree {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct SearchDocument {
-    /// The design without the free fields.
+    /// The design. Its values of the free fields are ignored. Default of `sweep.samples`: 16.
     pub base: Base,
     /// The free fields, by JSON pointer into the design. Default: derived from the limits on the transmission ratio and
     /// the outer diameter.

@@ -20,7 +20,7 @@ pub(crate) fn id(
     limits: &question::Limits,
 ) -> Result<Key, NoAnswer> {
     let mut asked = tree_of(document)?;
-    let base = complete(&asked.remove(&["base".into()]).unwrap_or(Tree::Null))?;
+    asked.remove(&["base".into()]);
     for (name, value) in resolved {
         asked.set(&[name.into()], value);
     }
@@ -28,7 +28,7 @@ pub(crate) fn id(
     if asked.at(&names).is_some() {
         asked.set(&names, Tree::Array(quantities.iter().map(|quantity| Tree::Text(quantity.name.into())).collect()));
     }
-    // The base is hashed as the designs at both ends of all ranges, plus its own values of the varied fields.
+    // The base is hashed as the designs at both ends of all ranges. The values that the study replaces do not count.
     let end = |is_low: bool| {
         move |variable: &Variable| match variable.domain {
             Domain::Real { min, max } | Domain::Whole { min, max } => Some(if is_low { min } else { max }),
@@ -37,10 +37,6 @@ pub(crate) fn id(
     };
     let designs = template.examples_at(end(true)).chain(template.examples_at(end(false)));
     let mut parts = designs.map(|design| hash_of(&complete(&design)?)).collect::<Result<Vec<_>, _>>()?;
-    let own = template.variables().iter().flat_map(|variable| {
-        [Tree::Text(variable.pointer.clone()), base.at(variable.path()).cloned().unwrap_or(Tree::Null)]
-    });
-    parts.push(hash_of(&Tree::Array(own.collect()))?);
     parts.push(hash_of(&asked)?);
     let within = format!("{} states, {} points", limits.max_states, limits.max_profile_points);
     Ok(Key::new("study", &parts.join(" ").as_str(), &within.as_str()))
@@ -54,12 +50,16 @@ pub(crate) fn complete(design: &Tree) -> Result<Tree, NoAnswer> {
     }
 }
 
-/// Returns the base with the default of each number that it leaves out at these pointers.
+/// Returns the base with the default of each number that it leaves out at these pointers, and of the law that has it.
 pub(crate) fn with_defaults_at<'a>(base: &Tree, pointers: impl Iterator<Item = &'a String>) -> Result<Tree, NoAnswer> {
-    let mut written = base.clone();
+    let (complete, mut written) = (complete(base)?, base.clone());
+    let law = ["model", "stiffness", "law"].map(String::from);
     for place in pointers.filter_map(|pointer| path(pointer)).filter(|place| base.at(place).is_none()) {
-        if let Some(default @ Tree::Number(_)) = complete(base)?.at(&place) {
+        if let Some(default @ Tree::Number(_)) = complete.at(&place) {
             written.set(&place, default.clone());
+            if let (Some(name), true) = (complete.at(&law), place.starts_with(&law[..2])) {
+                written.set(&law, name.clone());
+            }
         }
     }
     Ok(written)

@@ -59,9 +59,11 @@ impl Sensitivity {
         Ok((Self { inputs: moved }, template))
     }
 
-    /// Each input with its step, in one form for all spellings.
+    /// Each input with its value and its step, in one form for all spellings.
     pub(crate) fn asked(&self) -> Tree {
-        let asked = |input: &Input| [Tree::Text(input.pointer.clone()), Tree::Number(input.plus_minus)];
+        let asked = |Input { pointer, value, plus_minus }: &Input| {
+            [Tree::Text(pointer.clone()), Tree::Number(*value), Tree::Number(*plus_minus)]
+        };
         Tree::Array(self.inputs.iter().flat_map(asked).collect())
     }
 

@@ -230,18 +230,23 @@ impl Study {
             let document = rows.document(&mut template, variant);
             check(&self.evaluator.quantities, document, &limits.calculation).err()
         };
-        let found = match &self.kind {
-            Kind::Map(_) | Kind::Search(_) => None,
-            Kind::Sensitivity(sensitivity) => refused(sensitivity, 0).map(|refused| (refused, "/base")),
+        let (found, is_drawn) = match &self.kind {
+            Kind::Map(_) | Kind::Search(_) => (None, false),
+            Kind::Sensitivity(sensitivity) => (refused(sensitivity, 0), false),
             Kind::Tolerance(tolerance) => match refused(tolerance, 0) {
-                Some(refused) => Some((refused, "/base")),
+                Some(refused) => (Some(refused), false),
                 // A single impossible drive is a result of the study. A model without deviations is an error.
-                None => refused(tolerance, 1).filter(is_of_every_draw).map(|refused| (refused, "")),
+                None => (refused(tolerance, 1).filter(is_of_every_draw), true),
             },
         };
-        let Some((mut refused, place)) = found else { return Ok(self) };
+        let Some(mut refused) = found else { return Ok(self) };
         for error in &mut refused.errors {
-            let stands = format!("{place}{}", error.pointer);
+            let stands = match error.pointer.as_str() {
+                pointer if !is_drawn => format!("/base{pointer}"),
+                // The study names them as the design does.
+                pointer if pointer.starts_with("/deviations") => pointer.into(),
+                pointer => self.template.blamed(pointer),
+            };
             refused.detail = refused.detail.replacen(&error.pointer, &stands, 1);
             error.pointer = stands;
         }

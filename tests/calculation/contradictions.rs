@@ -144,6 +144,26 @@ fn deprecated_clearance_means_the_same_in_parts() {
     // Equal values are no contradiction.
     let both = json!({ "model": old["model"], "parts": new["parts"] });
     assert_eq!(largest_n(&both).to_bits(), largest_n(&new).to_bits());
+    // A deprecated gap of zero counts as left out.
+    let zero = json!({ "model": { "clearance": { "ring_um": 0.0 } }, "parts": new["parts"] });
+    assert_eq!(swept(&zero).unwrap(), swept(&new).unwrap());
+}
+
+/// Returns the wind-up without load at each input angle.
+fn unloaded_deg(modification: &Value) -> Vec<f64> {
+    let found = swept(&json!({ "modification": modification, "sweep": { "wind_up": true } })).unwrap();
+    let column = found["wind_up"]["unloaded_wind_up_deg"].as_array().unwrap();
+    column.iter().map(|number| number.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn shifts_of_ring_flank_add_up() {
+    let shifted = json!({ "ring_path_shift_um": 10.0, "ring_profile_shift_um": 10.0 });
+    let both = unloaded_deg(&shifted);
+    for shift in ["ring_path_shift_um", "ring_profile_shift_um"] {
+        let one = unloaded_deg(&json!({ shift: 10.0 }));
+        assert!(one.iter().zip(&both).all(|(one, both)| one < both), "{shift}");
+    }
 }
 
 #[test]
@@ -203,7 +223,7 @@ fn converted_document_gives_same_forces_undeprecated() {
         let new = convert(&old);
         let answer = |document: &Value| Sweep.ask(document.to_string().as_bytes(), &LIMITS, &Never).unwrap();
         let (old, new) = (answer(&old), answer(&new));
-        assert_eq!((&new.states, &new.model), (&old.states, &old.model), "{model}");
+        assert_eq!((&new.states, &new.model.refinements), (&old.states, &old.model.refinements), "{model}");
         assert!(!codes(&serde_json::to_value(&new).unwrap()).iter().any(|(code, _)| code == "deprecated_field"));
     }
 }

@@ -58,6 +58,11 @@ fn defaults(document: &Value) -> Vec<(String, Value)> {
     }
     put(&mut written, "/parts/ring/rim", json!("housed"));
     put(&mut written, "/model/stiffness", serde_json::to_value(design.stiffness()).unwrap());
+    for rate in ["wave_generator", "ring", "carrier"].map(|part| format!("/friction/wear_rate_mm3_per_nm/{part}")) {
+        if design.friction.is_some() && written.pointer(&rate).is_none() {
+            put(&mut written, &rate, json!(0.0));
+        }
+    }
     let left_out = |pointer: &String| document.pointer(pointer).is_none();
     let found = leaves(&written, "").into_iter().filter(left_out);
     found.map(|pointer| (pointer.clone(), written.pointer(&pointer).unwrap().clone())).collect()
@@ -126,6 +131,8 @@ fn refined() -> Vec<Value> {
         with("/model/refinements", json!(["corner_contact", "ring_teeth_bend"])),
         with("/model/refinements", json!("none")),
         with("/model/stiffness", json!({ "law": "palmgren" })),
+        with("/model", json!({ "series_compliance_mm_per_n": "estimated" })),
+        with("/model", json!({ "clearance": { "ring_um": 10.0, "carrier_um": 2.0 } })),
     ]);
     documents
 }
@@ -143,6 +150,17 @@ fn returned_model_gives_same_answer() {
         };
         assert_eq!(key(&sent_back), key(&document), "{sent_back}");
     }
+}
+
+#[test]
+fn zero_wear_rates_add_nothing_to_answer() {
+    let friction = json!({ "wave_generator": { "kind": "plain", "coefficient": 0.05 }, "ring": { "coefficient": 0.05 }, "carrier": { "coefficient": 0.05 } });
+    let mut document = pointed();
+    put(&mut document, "/friction", friction);
+    put(&mut document, "/load/input_speed_rpm", json!(1500.0));
+    let without = answer(&document);
+    put(&mut document, "/friction/wear_rate_mm3_per_nm", json!({ "ring": 0.0 }));
+    assert_eq!(answer(&document), without);
 }
 
 #[test]

@@ -89,6 +89,47 @@ fn inputs_written_out_keep_the_id() {
     }
 }
 
+/// A base without a required field, which the study sets, is no design. Its defaults still count.
+#[test]
+fn explicit_default_of_varied_field_keeps_the_id() {
+    let free = json!({
+        "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0 }, "/parts/ring/clearance_um": { "min": 0.0, "max": 5.0 },
+        "/materials/ring/youngs_modulus_gpa": { "min": 100.0, "max": 210.0 }
+    });
+    let mut base = paper();
+    base["drive"]["teeth"].as_object_mut().unwrap().remove("radius_mm");
+    let search = json!({ "study": "search", "base": base, "free": free, "objectives": [{ "quantity": "peak_force_n", "goal": "min" }] });
+    for (pointer, default) in [
+        ("/base/parts", json!({ "ring": { "clearance_um": 0.0 } })),
+        ("/base/materials", json!({ "ring": { "youngs_modulus_gpa": 210.0 } })),
+    ] {
+        assert_same_id(&search, &with(&search, pointer, default));
+    }
+}
+
+#[test]
+fn replaced_value_of_base_keeps_the_id() {
+    let [base, ..] = examples();
+    let other = with(&base, "/drive/teeth/radius_mm", json!(1.4));
+    let (studies, others) = (studies(&base), studies(&other));
+    // The radii of the map are those of the base.
+    let map = with(&others[0], "/over", studies[0]["over"].clone());
+    assert_same_id(&studies[0], &map);
+    let search = with(&others[1], "/free", studies[1]["free"].clone());
+    assert_same_id(&studies[1], &search);
+    for (one, other) in studies[2..].iter().zip(&others[2..]) {
+        assert_ne!(study(one).unwrap().id(), study(other).unwrap().id(), "{other}");
+    }
+}
+
+#[test]
+fn number_of_default_law_is_input() {
+    let base = with(&paper(), "/model", json!({}));
+    let inputs = json!({ "/model/stiffness/depth_mm/ring": {} });
+    let short = json!({ "study": "sensitivity", "base": base, "inputs": inputs, "quantities": ["peak_force_n"] });
+    assert_same_id(&short, &with(&short, "/base/model/stiffness", json!({ "law": "johnson" })));
+}
+
 fn assert_same_id(short: &Value, long: &Value) {
     assert_eq!(study(short).unwrap().id(), study(long).unwrap().id(), "{short} {long}");
 }

@@ -391,10 +391,13 @@ fn deviations_of_impossible_base_are_refused_beforehand() {
     let count = json!({ "/drive/teeth/count": { "distribution": "uniform", "limit": 1.0 } });
     let runout = json!({ "ring_runout": { "distribution": "uniform", "limit": 8.0 } });
     let amount = json!({ "/deviations/ring_runout/amount_um": { "distribution": "uniform", "limit": 1.0 } });
+    let shifted = json!({ "/modification/slot_wall_um": { "distribution": "uniform", "limit": 1.0 } });
+    let modified = with(&with(&drawn, "/deviations", json!({})), "/inputs", shifted);
     let drawn_twice = with(&with(&taking, "/deviations", runout), "/inputs", amount);
     for (document, at, code) in [
-        // The paper's model does not support deviations.
+        // The paper's model does not support deviations or modifications.
         (drawn.clone(), "/deviations", "conflicting_fields"),
+        (modified, "/inputs/~1modification~1slot_wall_um", "conflicting_fields"),
         (with(&taking, "/base/drive/teeth/radius_mm", json!(9.0)), "/base/drive/teeth/radius_mm", "teeth_touch"),
         (with(&moved, "/base/drive/teeth/radius_mm", json!(9.0)), "/base/drive/teeth/radius_mm", "teeth_touch"),
         (

@@ -21,7 +21,7 @@ pub struct FrictionDocument {
     pub ring: CoefficientDocument,
     /// Friction between teeth and carrier.
     pub carrier: CoefficientDocument,
-    /// Wear rates of the parts for Archard's law, in mm³/(N·m). Default: wear is not calculated.
+    /// Wear rates of the parts for Archard's law, in mm³/(N·m). If all are 0, as by default, wear is not calculated.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wear_rate_mm3_per_nm: Option<WearRatesDocument>,
@@ -131,6 +131,11 @@ impl FrictionDocument {
                 Err(violations)
             }
         }
+    }
+
+    /// Removes wear rates that are all zero, as by default.
+    pub(super) fn leave_out_zero_wear(&mut self) {
+        self.wear_rate_mm3_per_nm.take_if(|rates| *rates == WearRatesDocument::default());
     }
 
     /// The wear rates, where there are any.

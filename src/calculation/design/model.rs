@@ -45,7 +45,7 @@ pub struct ModelDocument {
     #[schema(nullable = false, deprecated)]
     pub corner_contact: Option<bool>,
     /// Use `clearance_um` of the `parts`. A gap at a contact is assigned to the part that the teeth touch there, unless
-    /// `parts` already gives the same gap.
+    /// `parts` already gives the same gap. A gap of 0 µm counts as left out.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, deprecated)]
     pub clearance: Option<ClearanceDocument>,
@@ -108,12 +108,6 @@ impl SeriesComplianceDocument {
 impl Default for SeriesComplianceDocument {
     fn default() -> Self {
         Self::Given(CompliancesDocument::default())
-    }
-}
-
-impl From<PerContact<f64>> for SeriesComplianceDocument {
-    fn from(PerContact { wave_generator, ring, carrier }: PerContact<f64>) -> Self {
-        Self::Given(CompliancesDocument { wave_generator, ring, carrier })
     }
 }
 

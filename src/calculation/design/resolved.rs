@@ -2,9 +2,7 @@
 
 use toothwave_solver::drive::Draft;
 use toothwave_solver::violation::Modified;
-use toothwave_solver::{
-    Compatibility, Deviations, LoadCase, Modification, Parameter, Part, PerContact, Violation, model_error,
-};
+use toothwave_solver::{Compatibility, Deviations, Modification, Parameter, Part, PerContact, Violation, model_error};
 
 use super::{
     ClearanceDocument, Design, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument, Refinements,
@@ -266,13 +264,14 @@ impl Design {
         stiffness
     }
 
-    /// The complete model of a load, for a drive that has pointed or bored tips or not.
-    pub fn complete_model(&self, load: &LoadCase, has_pointed_tips: bool) -> ModelDocument {
+    /// The complete model, for a drive that has pointed or bored tips or not. `refinements` replaces deprecated switches.
+    pub fn complete_model(&self, has_pointed_tips: bool) -> ModelDocument {
         ModelDocument {
             compatibility: self.model.compatibility,
             stiffness: Some(self.stiffness()),
-            series_compliance_mm_per_n: load.parameters().series_compliance_mm_per_n.into(),
+            series_compliance_mm_per_n: self.model.series_compliance_mm_per_n.clone(),
             refinements: RefinementsDocument::only(self.refinements(has_pointed_tips)),
+            clearance: self.clearance_in_key().cloned(),
             ..ModelDocument::default()
         }
     }

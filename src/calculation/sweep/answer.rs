@@ -73,7 +73,8 @@ pub struct SweepAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub radial_force_n: Option<RadialForceAnswer>,
-    /// The complete model that was used. As `model` of the document it gives the same answer.
+    /// The complete model that was used. As `model` of the document it gives the same answer. Instead of deprecated
+    /// switches it has `refinements`.
     pub model: ModelDocument,
     /// Error of the model against elastic bodies.
     pub model_error: ModelError,
