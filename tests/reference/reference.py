@@ -1375,7 +1375,7 @@ def solve_extreme_case(case):
 
 
 # ---------------------------------------------------------------------------------------------------------
-# What must fit (docs/explanation/theory.md, section 7; the API's ranges)
+# Conditions for a possible drive (docs/explanation/theory.md, section 7; the API's ranges)
 # ---------------------------------------------------------------------------------------------------------
 
 def tooth_center_in_doubles(a, b, r, psi):
