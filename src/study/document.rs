@@ -207,6 +207,7 @@ pub struct SearchDocument {
     pub seed: Whole,
     /// Designs that the search evaluates first. Each has a value for every free field; its other fields are ignored.
     #[serde(default)]
+    #[schema(inline)] // Generators for C++ lose the type of a referenced map in a list.
     pub start: Vec<Base>,
 }
 
