@@ -1,7 +1,7 @@
 //! Fields of the design document: their pointers, and their kinds of error.
 
 use serde::Serialize;
-use toothwave_solver::violation::{Listed, Misfit, Modified, OfDutyPoint, Violation};
+use toothwave_solver::violation::{Listed, Misfit, Modified, OfDutyPoint, Range, Violation};
 use toothwave_solver::{Contact, Parameter, Part};
 use utoipa::ToSchema;
 
@@ -185,6 +185,12 @@ impl FieldError {
             limit: None,
         }
     }
+}
+
+/// Returns the pointer and the range of each number of the design document, of a list's entries those of the first.
+pub fn ranges() -> impl Iterator<Item = (String, Range)> {
+    let with_range = |parameter: Parameter| (pointer(parameter), parameter.range());
+    Parameter::all().into_iter().map(with_range).filter(|(_, range)| range.low.is_finite())
 }
 
 /// Returns the JSON pointer of a parameter in the design document.

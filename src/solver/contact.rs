@@ -15,6 +15,13 @@ pub enum Part {
     Carrier,
 }
 
+impl Part {
+    /// Returns all parts.
+    pub const fn all() -> [Self; 4] {
+        [Self::WaveGenerator, Self::Teeth, Self::Ring, Self::Carrier]
+    }
+}
+
 /// A contact of a tooth with another part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
@@ -28,6 +35,11 @@ pub enum Contact {
 }
 
 impl Contact {
+    /// Returns all contacts.
+    pub const fn all() -> [Self; 3] {
+        [Self::WaveGenerator, Self::Ring, Self::Carrier]
+    }
+
     /// Returns the part that teeth touch there.
     pub const fn mate(self) -> Part {
         match self {

@@ -231,7 +231,7 @@ impl CarrierFingers {
 
     /// Returns the states with their stresses at the most loaded place along the teeth.
     pub fn states_along(&self, mut states: States) -> States {
-        for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
+        for contact in Contact::all() {
             let factor = self.stress_factor(contact);
             states.stress_mpa.get_mut(contact).iter_mut().for_each(|stress_mpa| *stress_mpa *= factor);
         }

@@ -35,13 +35,10 @@ pub struct LinearDocument {}
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct FixedDocument {
     /// Stiffness at the wave generator, in N/mm.
-    #[schema(minimum = 1e-3, maximum = 1e15)]
     pub wave_generator_n_per_mm: f64,
     /// Stiffness at the ring, in N/mm.
-    #[schema(minimum = 1e-3, maximum = 1e15)]
     pub ring_n_per_mm: f64,
     /// Stiffness at the carrier, in N/mm.
-    #[schema(minimum = 1e-3, maximum = 1e15)]
     pub carrier_n_per_mm: f64,
 }
 

@@ -14,22 +14,16 @@ use crate::key::encoded;
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct DeviationsDocument {
     /// Reduction of the teeth's radius, by slot, in µm.
-    #[schema(minimum = -1e6, maximum = 1e6)]
     pub tooth_radius_um: Vec<f64>,
     /// Rotation of the slots about the axis, by slot, in arcsec.
-    #[schema(minimum = -1e5, maximum = 1e5)]
     pub slot_angle_arcsec: Vec<f64>,
     /// Offset of the slots' walls, by slot, in µm.
-    #[schema(minimum = -1e6, maximum = 1e6)]
     pub slot_wall_um: Vec<f64>,
     /// Offset of the profiles along their normals, by ring space, in µm.
-    #[schema(minimum = -1e6, maximum = 1e6)]
     pub ring_space_um: Vec<f64>,
     /// Rotation of the ring's spaces about the axis, by ring space, in arcsec.
-    #[schema(minimum = -1e5, maximum = 1e5)]
     pub ring_space_angle_arcsec: Vec<f64>,
     /// Offset of the wave generator along its normals, by lobe, in µm.
-    #[schema(minimum = -1e6, maximum = 1e6)]
     pub wave_generator_lobe_um: Vec<f64>,
     /// Runout of the wave generator. Its angle is counted from the middle of lobe 0.
     pub wave_generator_runout: RunoutDocument,
@@ -44,10 +38,8 @@ pub struct DeviationsDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct RunoutDocument {
     /// Distance from the axis, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub amount_um: f64,
     /// Direction, in deg. Default: 0 deg.
-    #[schema(minimum = -360.0, maximum = 360.0, default = 0.0)]
     pub angle_deg: f64,
 }
 

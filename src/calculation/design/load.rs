@@ -6,8 +6,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use toothwave_solver::fingers::LoadCycle;
-use toothwave_solver::violation::Range;
-use toothwave_solver::{Material, Parameter, PerContact};
+use toothwave_solver::{Material, PerContact};
 use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
@@ -34,10 +33,8 @@ pub struct MaterialsDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct MaterialDocument {
     /// Young's modulus E, in GPa. Default: 210 GPa.
-    #[schema(minimum = 1e-3, maximum = 1e5, default = 210.0)]
     pub youngs_modulus_gpa: f64,
     /// Poisson's ratio ν. Default: 0.3.
-    #[schema(exclusive_minimum = -1.0, exclusive_maximum = 0.5, default = 0.3)]
     pub poissons_ratio: f64,
 }
 
@@ -55,11 +52,11 @@ impl Default for MaterialDocument {
 pub struct LoadDocument {
     /// Torque M0 at the wave generator, in N·m.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    #[schema(nullable = false)]
     pub input_torque_nm: Option<f64>,
     /// Torque at the carrier, in N·m, without losses.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    #[schema(nullable = false)]
     pub output_torque_nm: Option<f64>,
     /// Allowable contact stress, in MPa, for the torque capacity. A finding reports if it is exceeded. Default: no
     /// torque capacity.
@@ -69,14 +66,14 @@ pub struct LoadDocument {
     /// Speed of the wave generator, in 1/min. With `friction` it gives powers and sliding speeds. The points of a duty
     /// have their own speeds.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    #[schema(nullable = false)]
     pub input_speed_rpm: Option<f64>,
     /// Course of the load on the carrier's fingers, for their fatigue. Default: pulsating.
     #[serde(default)]
     pub cycle: LoadCycle,
     /// Load spectrum: one to 100 loads, whose shares of the running time add up to one.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, min_items = 1, max_items = 100)]
+    #[schema(nullable = false)]
     pub duty: Option<Vec<DutyPointDocument>>,
 }
 
@@ -86,17 +83,15 @@ pub struct LoadDocument {
 pub struct DutyPointDocument {
     /// Torque M0 at the wave generator, in N·m.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    #[schema(nullable = false)]
     pub input_torque_nm: Option<f64>,
     /// Torque at the carrier, in N·m, without losses.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    #[schema(nullable = false)]
     pub output_torque_nm: Option<f64>,
     /// Speed of the wave generator, in 1/min.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub input_speed_rpm: f64,
     /// Share of the running time, from 0 to 1.
-    #[schema(minimum = 1e-9, maximum = 1.0)]
     pub share_of_time: f64,
 }
 
@@ -114,13 +109,10 @@ pub enum AllowableStressDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct StressByContactDocument {
     /// Between teeth and wave generator, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
     pub wave_generator: f64,
     /// Between teeth and ring, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
     pub ring: f64,
     /// Between teeth and carrier, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
     pub carrier: f64,
 }
 
@@ -161,11 +153,9 @@ impl<'de> Deserialize<'de> for AllowableStressDocument {
 
 impl PartialSchema for AllowableStressDocument {
     fn schema() -> RefOr<Schema> {
-        let Range { low, high, .. } = Parameter::AllowableStress.range();
-        let number = ObjectBuilder::new().schema_type(Type::Number).minimum(Some(low)).maximum(Some(high));
         OneOfBuilder::new()
             .description(Some("Allowable contact stress, in MPa: one number for all contacts, or one for each."))
-            .item(number)
+            .item(ObjectBuilder::new().schema_type(Type::Number))
             .item(Ref::from_schema_name(StressByContactDocument::name()))
             .into()
     }

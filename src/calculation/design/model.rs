@@ -56,13 +56,13 @@ pub struct ModelDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct ClearanceDocument {
     /// Gap at the wave generator, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, deprecated)]
+    #[schema(deprecated)]
     pub wave_generator_um: f64,
     /// Gap at the ring, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, deprecated)]
+    #[schema(deprecated)]
     pub ring_um: f64,
     /// Gap at the carrier, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, deprecated)]
+    #[schema(deprecated)]
     pub carrier_um: f64,
 }
 
@@ -80,13 +80,10 @@ pub enum SeriesComplianceDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct CompliancesDocument {
     /// At the wave generator, in mm/N. Default: 0 mm/N.
-    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub wave_generator: f64,
     /// At the ring, in mm/N. Default: 0 mm/N.
-    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub ring: f64,
     /// At the carrier, in mm/N. Default: 0 mm/N.
-    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub carrier: f64,
 }
 

@@ -11,42 +11,26 @@ use crate::key::encoded;
 /// Modification: intentional differences of the parts from the conjugate shape, the same for all teeth, with
 /// `virtual_work` only. A positive value opens a gap. A positive angle is a rotation away from the flank under load.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct ModificationDocument {
     /// Offset of the ring's profile along its normals, in µm. Default: 0 µm.
-    #[serde(default)]
-    #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub ring_equidistant_um: f64,
     /// Outward shift of the path that generates the ring, along its radii, in µm. Default: 0 µm.
-    #[serde(default)]
-    #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub ring_path_shift_um: f64,
     /// Outward shift of the ring's profile, along its own radii, in µm. Default: 0 µm.
-    #[serde(default)]
-    #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub ring_profile_shift_um: f64,
     /// Rotation of the ring's flanks about the axis, in arcsec. Default: 0 arcsec.
-    #[serde(default)]
-    #[schema(minimum = -1e5, maximum = 1e5, default = 0.0)]
     pub ring_rotation_arcsec: f64,
     /// Offset of the wave generator along its normals, in µm. Default: 0 µm.
-    #[serde(default)]
-    #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub wave_generator_equidistant_um: f64,
     /// Offset of the slots' walls, in µm. Default: 0 µm.
-    #[serde(default)]
-    #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub slot_wall_um: f64,
     /// Rotation of the carrier about the axis, in arcsec. Default: 0 arcsec.
-    #[serde(default)]
-    #[schema(minimum = -1e5, maximum = 1e5, default = 0.0)]
     pub carrier_rotation_arcsec: f64,
     /// Reduction of the teeth's radius, in µm. Default: 0 µm.
-    #[serde(default)]
-    #[schema(minimum = -1e6, maximum = 1e6, default = 0.0)]
     pub tooth_radius_um: f64,
     /// Tip relief: offset of the ring's flank towards its tip. Default: no relief.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub ring_tip_relief: Option<TipReliefDocument>,
 }
@@ -57,13 +41,10 @@ pub struct ModificationDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct TipReliefDocument {
     /// Amount C at the flank's end, in µm.
-    #[schema(minimum = -1e6, maximum = 1e6)]
     pub amount_um: f64,
     /// Start ψ_t: tooth position from the middle of the lobe, in deg. It must be before the flank's end.
-    #[schema(minimum = 0.0, maximum = 180.0)]
     pub start_deg: f64,
     /// Power n.
-    #[schema(minimum = 0.1, maximum = 100.0)]
     pub power: f64,
 }
 

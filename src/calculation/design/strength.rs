@@ -28,13 +28,10 @@ pub enum StrengthDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct StrengthNumbersDocument {
     /// Yield strength R_p0.2, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
     pub yield_strength_mpa: f64,
     /// Tensile strength R_m, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
     pub tensile_strength_mpa: f64,
     /// Endurance limit σ_W under reversed load, without a notch, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
     pub endurance_limit_mpa: f64,
     /// True if the material breaks at a notch before it yields there, as hardened steel does. Default: false.
     #[serde(default)]
