@@ -15,10 +15,13 @@ use crate::{SolveError, Stop};
 /// A polyline in mm.
 pub type Polyline = Vec<Point2<f64>>;
 
-/// Extent of the ring.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Part of the ring to draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "snake_case"), schema(as = ExtentDocument))]
 pub enum Extent {
-    /// From one tooth's symmetry line to the next, angles ∓π/Z_K.
+    /// From one tooth's symmetry line to the next, angles ∓π/Z_K, so that copies join.
+    #[default]
     Tooth,
     /// The closed ring, its last point equal to its first.
     Full,

@@ -780,10 +780,11 @@ fn losses_equal_force_times_slip_with_moving_generator() {
     let states = &sweep.states;
     for (&angle_deg, &loss_ratio) in sweep.input_angles.input_angle_deg.iter().zip(&losses.loss_ratio) {
         let of_angle = (0..states.len()).filter(|&state| states.input_angle_deg[state] == angle_deg);
-        let lost_nmm = of_angle.flat_map(|state| Contact::all().map(|contact| (state, contact))).map(|(state, contact)| {
-            let slip_mm = losses.slip_mm_per_rad.get(contact)[state].abs();
-            coefficient.get(contact) * states.force_n.get(contact)[state] * slip_mm
-        });
+        let lost_nmm =
+            of_angle.flat_map(|state| Contact::all().map(|contact| (state, contact))).map(|(state, contact)| {
+                let slip_mm = losses.slip_mm_per_rad.get(contact)[state].abs();
+                coefficient.get(contact) * states.force_n.get(contact)[state] * slip_mm
+            });
         // Two alike zones under 3 N·m.
         let expected = 2.0 * lost_nmm.sum::<f64>() / 3000.0;
         assert_near(loss_ratio, expected, 1e-12 * expected, "loss ratio");

@@ -6,7 +6,6 @@ use toothwave_solver::{ContactLaw, PerContact};
 use utoipa::ToSchema;
 
 use super::drive::LengthsByContactDocument;
-use crate::key::encoded;
 use crate::union::union;
 
 union! {
@@ -88,12 +87,4 @@ impl StiffnessDocument {
             }
         }
     }
-}
-
-encoded! {
-    struct LinearDocument {}
-    struct FixedDocument { wave_generator_n_per_mm, ring_n_per_mm, carrier_n_per_mm }
-    struct PalmgrenDocument {}
-    struct JohnsonDocument { depth_mm }
-    struct HertzDocument {}
 }

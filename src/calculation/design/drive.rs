@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 use toothwave_solver::{PerContact, ToothShape, WaveGenerator};
 use utoipa::ToSchema;
 
-use super::number::{Whole, given};
-use crate::key::{Encode, Encoder, encoded};
+use super::number::Whole;
 use crate::union::union;
 
 /// Wave generator, teeth and ring.
@@ -100,7 +99,7 @@ pub struct CylinderDocument {
     #[schema(value_type = i64)]
     pub count: Whole,
     /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a tooth, in mm.
@@ -117,7 +116,7 @@ pub struct BallDocument {
     #[schema(value_type = i64)]
     pub count: Whole,
     /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a ball, in mm.
@@ -136,7 +135,7 @@ pub struct FlatSidedDocument {
     #[schema(value_type = i64)]
     pub count: Whole,
     /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a tooth, in mm.
@@ -152,15 +151,15 @@ pub struct FlatSidedDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct LengthsByContactDocument {
     /// At the wave generator, in mm.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wave_generator: Option<f64>,
     /// At the ring, in mm.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub ring: Option<f64>,
     /// At the carrier, in mm.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub carrier: Option<f64>,
 }
@@ -256,39 +255,4 @@ pub struct RingDocument {
     /// Radius of a bore that truncates the teeth, in mm. Null or left out: the ring keeps its natural tip.
     #[serde(default)]
     pub tip_radius_mm: Option<f64>,
-}
-
-encoded! {
-    struct DriveDocument { wave_generator, teeth, ring }
-    struct EllipseDocument { semi_major_mm, semi_minor_mm }
-    struct EccentricDocument { radius_mm, eccentricity_mm }
-    struct HarmonicDocument { lobes, mean_radius_mm, amplitude_mm }
-    struct HarmonicPathDocument { lobes, mean_path_radius_mm, amplitude_mm }
-    struct LengthsByContactDocument { wave_generator, ring, carrier }
-    struct RingDocument { teeth, tip_radius_mm }
-}
-
-/// With the default of `installed`. The document keeps the field empty, so that no error refers to a field that is left
-/// out.
-impl Encode for CylinderDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Self { count, installed, radius_mm, width_mm } = self;
-        (count, installed.unwrap_or(*count), radius_mm, width_mm).encode(encoder);
-    }
-}
-
-/// With the default of `installed`, as for cylinders.
-impl Encode for BallDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Self { count, installed, radius_mm, groove_radius_mm } = self;
-        (count, installed.unwrap_or(*count), radius_mm, groove_radius_mm).encode(encoder);
-    }
-}
-
-/// With the default of `installed`, as for cylinders.
-impl Encode for FlatSidedDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Self { count, installed, radius_mm, width_mm, flat_length_mm } = self;
-        (count, installed.unwrap_or(*count), radius_mm, width_mm, flat_length_mm).encode(encoder);
-    }
 }

@@ -7,8 +7,6 @@ use toothwave_solver::losses::{Friction, FrictionParameters, RaceBearing, WaveGe
 use toothwave_solver::{Contact, Parameter, PerContact, Violation};
 use utoipa::ToSchema;
 
-use super::number::given;
-use crate::key::encoded;
 use crate::union::union;
 
 /// Coulomb friction at each contact.
@@ -22,7 +20,7 @@ pub struct FrictionDocument {
     /// Friction between teeth and carrier.
     pub carrier: CoefficientDocument,
     /// Wear rates of the parts for Archard's law, in mm³/(N·m). Default: wear is not calculated.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wear_rate_mm3_per_nm: Option<WearRatesDocument>,
 }
@@ -72,7 +70,7 @@ pub struct RaceDocument {
     pub bearing_radius_mm: f64,
     /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
     /// circle. Default: no life is calculated.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub bearing_load_rating_n: Option<f64>,
     /// Rolling element of the bearing. Default: ball.
@@ -85,7 +83,7 @@ pub struct RaceDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RollingDocument {
     /// Allowed as for `race`, but without effect: such a race does not slide on the teeth.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub coefficient: Option<f64>,
     /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
@@ -94,7 +92,7 @@ pub struct RollingDocument {
     pub bearing_radius_mm: f64,
     /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
     /// circle. Default: no life is calculated.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub bearing_load_rating_n: Option<f64>,
     /// Rolling element of the bearing. Default: ball.
@@ -184,13 +182,3 @@ impl From<&FrictionDocument> for FrictionParameters {
         }
     }
 }
-
-encoded! {
-    struct FrictionDocument { wave_generator, ring, carrier, wear_rate_mm3_per_nm }
-    struct CoefficientDocument { coefficient }
-    struct WearRatesDocument { wave_generator, ring, carrier }
-    struct RaceDocument { coefficient, bearing_coefficient, bearing_radius_mm, bearing_load_rating_n, bearing_element }
-    struct RollingDocument { coefficient, bearing_coefficient, bearing_radius_mm, bearing_load_rating_n, bearing_element }
-}
-
-encoded!(enum RollingElement);

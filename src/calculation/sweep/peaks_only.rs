@@ -3,7 +3,6 @@
 use crate::design::{Design, ModelDocument};
 use crate::findings::FindingAnswer;
 use crate::forms::{Form, Format, Forms};
-use crate::key::Encode;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, Stop};
 use crate::sweep::Sweep;
@@ -96,7 +95,7 @@ impl Question for PeaksOnly {
         "peaks"
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
         Sweep.reads(design)
     }
 

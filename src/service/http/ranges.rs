@@ -13,8 +13,7 @@ pub(super) fn put_ranges(document: &mut Value) {
         for name in pointer.split('/').skip(1) {
             places = places.iter().flat_map(|place| fields(document, place, name)).collect();
         }
-        let of_number =
-            if range.closed { ["minimum", "maximum"] } else { ["exclusiveMinimum", "exclusiveMaximum"] };
+        let of_number = if range.closed { ["minimum", "maximum"] } else { ["exclusiveMinimum", "exclusiveMaximum"] };
         for place in places.iter().flat_map(|place| alternatives(document, place)).collect::<Vec<_>>() {
             let Some(schema) = document.pointer_mut(&place).and_then(Value::as_object_mut) else { continue };
             let bounds = match schema.get("type").map(Value::to_string) {
