@@ -1,5 +1,4 @@
-//! The contact law. A law is a structure of its fields, a line of the union, an arm of each match and a line of
-//! `encoded!`.
+//! The contact law. A law is a structure of its fields, a line of the union and an arm of each match.
 
 use serde::{Deserialize, Serialize};
 use toothwave_solver::{ContactLaw, PerContact};
