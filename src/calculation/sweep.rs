@@ -354,7 +354,7 @@ impl Question for Sweep {
                 output_torque_nm: load.output_torque_nm(drive),
             },
             enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip && !load.presses_corners(drive),
-            peaks: PerContact::of(|contact| (*peaks.get(contact)).into()),
+            peaks,
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh(),
             loaded_teeth_per_zone: sweep.loaded_teeth(),
             wind_up: backlash

@@ -2,8 +2,10 @@
 
 use std::f64::consts::PI;
 
-/// A part with its own material.
+/// A part of the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "snake_case"), schema(as = BodyPart))]
 pub enum Part {
     /// The cam.
     WaveGenerator,

@@ -60,8 +60,12 @@
 //! | backlash | [`backlash::of`] |
 //! | losses, wear, duty, life of the bearing | [`losses::period::Losses::of`], [`losses::duty::DutySweep`] |
 //! | compliance behind the contacts | [`backing::Backings`] |
+//! | strength of the carrier, load along its teeth | [`fingers::CarrierFingers`] |
 //! | profiles and drawings | [`profile::profiles`], [`drawing::Drawing`] |
 //! | warnings, expected error of the model | [`findings`], [`model_error::of`] |
+//!
+//! Parameters are built with `..Default::default()`, so that a later field changes no caller. Enums are exhaustive, so
+//! that a match over violations, findings or errors shows what a later version adds.
 
 #[doc(hidden)]
 pub mod approach;

@@ -38,6 +38,12 @@ pub struct ProfileParameters {
     pub max_points: u64,
 }
 
+impl Default for ProfileParameters {
+    fn default() -> Self {
+        Self { chord_tolerance_mm: 1e-3, extent: Extent::default(), max_points: u64::MAX }
+    }
+}
+
 /// Profiles of the mating parts.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -96,7 +102,7 @@ const MAX_DEPTH: u32 = 40;
 /// # use toothwave_solver::{Drive, DriveParameters, Never};
 /// let drive = Drive::new(&DriveParameters::default()).unwrap();
 ///
-/// let parameters = ProfileParameters { chord_tolerance_mm: 1e-3, extent: Extent::Full, max_points: 100_000 };
+/// let parameters = ProfileParameters { extent: Extent::Full, ..ProfileParameters::default() };
 /// let ring = profiles(&drive, &parameters, &Never).unwrap().ring;
 /// assert_eq!(ring.first(), ring.last());
 /// ```

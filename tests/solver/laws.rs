@@ -520,7 +520,7 @@ fn ball_contact_shear_is_larger_bodys() {
     let (one, other, soft) = (peaks(0.2, 0.4), peaks(0.4, 0.2), peaks(0.4, 0.4));
     for (contact, one) in one.iter() {
         let [one, other, soft] = [one, other.get(contact), soft.get(contact)]
-            .map(|peaks| peaks.shear.unwrap().stress_mpa / peaks.stress_mpa.value);
+            .map(|peaks| peaks.shear_stress_mpa.unwrap() / peaks.stress_mpa.value);
         assert!((one / other - 1.0).abs() < 1e-9, "{contact:?}: {one} {other}");
         assert!(one > 1.01 * soft, "{contact:?}: {one} {soft}");
     }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use toothwave_solver::backing::Rim;
 use toothwave_solver::fingers::Fingers;
-use toothwave_solver::profile::Extent;
+use toothwave_solver::profile::{Extent, ProfileParameters};
 use utoipa::ToSchema;
 
 use super::number::Whole;
@@ -44,7 +44,8 @@ pub struct ProfileDocument {
 
 impl Default for ProfileDocument {
     fn default() -> Self {
-        Self { chord_tolerance_mm: 1e-3, extent: Extent::default() }
+        let ProfileParameters { chord_tolerance_mm, extent, .. } = ProfileParameters::default();
+        Self { chord_tolerance_mm, extent }
     }
 }
 

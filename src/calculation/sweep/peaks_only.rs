@@ -7,13 +7,14 @@ use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, Stop};
 use crate::sweep::Sweep;
 use crate::sweep::answer::{
-    ChecksAnswer, ContactPeaksAnswer, LoadAnswer, ModelError, PerContact, SweepAnswer, TeethInMesh, TorqueCapacity,
+    ChecksAnswer, LoadAnswer, ModelError, PerContact, SweepAnswer, TeethInMesh, TorqueCapacity,
 };
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::fingers::FingersAnswer;
 use crate::sweep::losses::LossTotals;
 use serde::{Serialize, Serializer};
+use toothwave_solver::sweep::ContactPeaks;
 
 /// The question for a sweep without columns.
 #[derive(Debug)]
@@ -33,7 +34,7 @@ struct View<'a> {
     sweep_period_deg: Option<f64>,
     load: &'a LoadAnswer,
     enters_under_load: bool,
-    peaks: &'a PerContact<ContactPeaksAnswer>,
+    peaks: &'a PerContact<ContactPeaks>,
     model: &'a ModelDocument,
     model_error: &'a ModelError,
     series_compliance_estimates: &'a [EstimateAnswer],
