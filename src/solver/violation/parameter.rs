@@ -58,10 +58,10 @@ pub const MAX_SAMPLES: i64 = 10_000_000;
 
 /// Makes an enum of lines `Name = range;`, with `Name(of: Kind)` for each part, contact or item.
 macro_rules! table {
-    (@each $all:ident, $name:ident) => { $all.push(Self::$name) };
-    (@each $all:ident, $name:ident, $kind:ty) => { $all.extend(<$kind>::all().into_iter().map(Self::$name)) };
-    (@each $all:ident, $name:ident, $kind:ty, $entry:ty) => {
-        $all.extend(<$kind>::all().into_iter().map(|of| Self::$name(of, 0)))
+    (@each $name:ident) => { vec![Self::$name] };
+    (@each $name:ident, $kind:ty) => { <$kind>::all().into_iter().map(Self::$name).collect() };
+    (@each $name:ident, $kind:ty, $entry:ty) => {
+        <$kind>::all().into_iter().map(|of| Self::$name(of, 0)).collect()
     };
     (
         $(#[$about:meta])* $table:ident:
@@ -83,9 +83,7 @@ macro_rules! table {
 
             /// Returns all of them, of the entries of a list the first.
             pub fn all() -> Vec<Self> {
-                let mut all = Vec::new();
-                $(table!(@each all, $name $(, $kind $(, $entry)?)?);)+
-                all
+                [$(table!(@each $name $(, $kind $(, $entry)?)?)),+].concat()
             }
         }
     };
