@@ -17,7 +17,6 @@ use utoipa::ToSchema;
 use crate::design::{Design, ModelDocument, Refinements};
 use crate::forms::{Form, Format, Forms, csv_error};
 use crate::json::word;
-use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 use crate::question::{Limits, Question, checked_drive, checked_load};
 
@@ -124,9 +123,10 @@ impl Question for Accuracy {
         "accuracy"
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        let Design { drive, materials, load, modification, deviations, accuracy, parts, .. } = design;
-        (drive, materials, load, design.model_in_key(), modification, (deviations, accuracy, parts.under_load()))
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
+        let Design { materials, load, modification, deviations, accuracy, parts, .. } = design;
+        let of_parts = (modification, deviations, parts.under_load());
+        (design.drive_in_key(), materials, load, design.model_in_key(), of_parts, accuracy)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedAccuracy, NoAnswer> {

@@ -11,7 +11,6 @@ use crate::design::Design;
 use crate::findings::{FindingAnswer, drive_findings, write_findings};
 use crate::forms::{Form, Format, Forms, csv_error};
 use crate::geometry::{EngagementAnswer, UndercutAnswer};
-use crate::key::Encode;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, checked_drive};
 
@@ -52,8 +51,8 @@ impl Question for CoincidenceDegree {
         "coincidence-degree"
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        &design.drive
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
+        design.drive_in_key()
     }
 
     fn check(&self, design: &Design, _: &Limits) -> Result<Drive, NoAnswer> {

@@ -9,8 +9,6 @@ use crate::field::{FieldCode, contact_name};
 use crate::json::{self, Fault, Tree};
 use crate::no_answer::NoAnswer;
 
-const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
-
 const SWITCHES: [DeprecatedField; 3] =
     [DeprecatedField::RingTeethBend, DeprecatedField::WaveGeneratorMoves, DeprecatedField::CornerContact];
 
@@ -66,7 +64,7 @@ fn convert_design(tree: &mut Tree) -> Result<(), NoAnswer> {
 /// Gives the gaps of `model.clearance` to the parts that teeth touch there, unless the parts have them.
 fn move_clearance(tree: &mut Tree) {
     let teeth_um = number(tree, &["parts", "teeth", "clearance_um"]);
-    for contact in CONTACTS.map(contact_name) {
+    for contact in Contact::all().map(contact_name) {
         let gap_um = number(tree, &["model", "clearance", &format!("{contact}_um")]);
         let part = ["parts", contact, "clearance_um"];
         if gap_um != 0.0 && number(tree, &part) + teeth_um == 0.0 {
@@ -116,7 +114,7 @@ fn convert_base(base: &mut Tree) -> Result<(), Fault> {
         }
     }
     let teeth_um = number(base, &["parts", "teeth", "clearance_um"]);
-    for contact in CONTACTS.map(contact_name) {
+    for contact in Contact::all().map(contact_name) {
         let gap_um = number(base, &["model", "clearance", &format!("{contact}_um")]);
         let of_parts = number(base, &["parts", contact, "clearance_um"]) + teeth_um;
         if gap_um != 0.0 && of_parts != 0.0 && gap_um.total_cmp(&of_parts).is_ne() {

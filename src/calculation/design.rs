@@ -8,10 +8,10 @@ use toothwave_solver::drawing::DrawingParameters;
 use toothwave_solver::fingers::{FingerParameters, LoadCycle};
 use toothwave_solver::losses::duty::LossParameters;
 use toothwave_solver::parts::{CarrierRadii, PartsParameters};
-use toothwave_solver::profile::{Extent, ProfileParameters};
+use toothwave_solver::profile::ProfileParameters;
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::{OfDutyPoint, SHARES_TOLERANCE};
-use toothwave_solver::{DriveParameters, LoadParameters, Material, Materials, Parameter, Torque, Violation};
+use toothwave_solver::{DriveParameters, LoadParameters, Materials, Modification, Parameter, Torque, Violation};
 use utoipa::ToSchema;
 
 use crate::field::FieldCode;
@@ -25,7 +25,6 @@ mod drive;
 mod friction;
 mod load;
 mod model;
-mod modification;
 mod number;
 mod refinements;
 mod resolved;
@@ -38,14 +37,12 @@ pub use drive::*;
 pub use friction::*;
 pub use load::*;
 pub use model::*;
-pub use modification::*;
 pub use number::Whole;
 pub use refinements::*;
 pub use resolved::*;
 pub use strength::*;
 
 use drive::Counted;
-use number::given;
 
 /// Design document for every endpoint; each endpoint reads only what it needs. Lengths are in mm, torques in N·m,
 /// moduli in GPa, stiffnesses in N/mm.
@@ -64,13 +61,13 @@ pub struct Design {
     pub drive: DriveDocument,
     /// Material of each part. Default: steel.
     #[serde(default)]
-    pub materials: MaterialsDocument,
+    pub materials: Materials,
     /// Load. Needed for a sweep only.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub load: Option<LoadDocument>,
     /// Friction. Used by a sweep only. Default: friction is not calculated.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub friction: Option<FrictionDocument>,
     /// The model of load sharing.
@@ -79,7 +76,7 @@ pub struct Design {
     /// Modification: intentional differences of the parts from the conjugate shape. A positive value opens a gap.
     /// Default: none.
     #[serde(default)]
-    pub modification: ModificationDocument,
+    pub modification: Modification,
     /// Deviations of individual items of the parts. A positive value opens a gap. Default: none.
     #[serde(default)]
     pub deviations: DeviationsDocument,
@@ -212,18 +209,9 @@ impl Design {
         })?;
         let Duty { points, hardest, .. } = self.duty_of(load)?;
         let torque = points[hardest].torque;
-        let material = |document: &MaterialDocument| Material {
-            youngs_modulus_gpa: document.youngs_modulus_gpa,
-            poissons_ratio: document.poissons_ratio,
-        };
         let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.refinements(has_pointed_tips);
         Ok(LoadParameters {
-            materials: Materials {
-                wave_generator: material(&self.materials.wave_generator),
-                teeth: material(&self.materials.teeth),
-                ring: material(&self.materials.ring),
-                carrier: material(&self.materials.carrier),
-            },
+            materials: self.materials,
             torque,
             compatibility: self.model.compatibility,
             law: (&self.stiffness()).into(),
@@ -231,7 +219,7 @@ impl Design {
             ring_teeth_bend,
             wave_generator_moves,
             corner_contact,
-            modification: (&self.modification).into(),
+            modification: self.modification,
             carrier: self.carrier_of_flats(),
             clearance_um: self.clearances_um().gaps(),
             allowable_stress_mpa: load.allowable_stress_mpa.map(Into::into),
@@ -381,7 +369,7 @@ impl Design {
             teeth_clearance_um: teeth,
             ring_clearance_um: by_contact.ring,
             carrier_clearance_um: by_contact.carrier,
-            modification: (&self.modification).into(),
+            modification: self.modification,
         })
     }
 
@@ -398,7 +386,7 @@ impl Design {
     pub fn finger_parameters(&self) -> Result<FingerParameters, Vec<Violation>> {
         let CarrierPartDocument { fingers, finger_fillet_radius_mm, strength, .. } = &self.parts.carrier;
         let fillet = finger_fillet_radius_mm.map(|radius_mm| (Parameter::FingerFilletRadius, radius_mm));
-        let numbers = strength.iter().flat_map(StrengthDocument::numbers);
+        let numbers = strength.iter().flat_map(StrengthDocument::parameters);
         let violations: Vec<_> =
             fillet.into_iter().chain(numbers).filter_map(|(parameter, value)| parameter.check(value)).collect();
         if !violations.is_empty() {
@@ -407,7 +395,7 @@ impl Design {
         Ok(FingerParameters {
             fingers: *fingers,
             fillet_radius_mm: *finger_fillet_radius_mm,
-            strength: strength.as_ref().map(Into::into),
+            strength: strength.map(StrengthDocument::numbers),
             cycle: self.load.as_ref().map_or_else(LoadCycle::default, |load| load.cycle),
             friction_coefficient: self.friction.as_ref().map_or(0.0, |friction| friction.carrier.coefficient),
         })
@@ -428,10 +416,7 @@ impl Design {
     /// The violation of the tolerance's range.
     pub fn profile_parameters(&self, max_points: u64) -> Result<ProfileParameters, Violation> {
         let chord_tolerance_mm = self.profile.chord_tolerance_mm;
-        let extent = match self.profile.extent {
-            ExtentDocument::Tooth => Extent::Tooth,
-            ExtentDocument::Full => Extent::Full,
-        };
+        let extent = self.profile.extent;
         Parameter::ChordTolerance
             .check(chord_tolerance_mm)
             .map_or(Ok(ProfileParameters { chord_tolerance_mm, extent, max_points }), Err)

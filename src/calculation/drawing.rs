@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use serde::Serialize;
 use toothwave_solver::drawing as solver;
 use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::{SolveError, Stop};
@@ -11,7 +12,7 @@ use crate::drawing::answer::{BodyAnswer, DrawingAnswer, DrawnPart, EdgeAnswer, O
 use crate::drawing::preset::Preset;
 use crate::findings::{Causes, FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};
-use crate::key::{Encode, Key};
+use crate::key::Key;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question};
 
@@ -73,15 +74,15 @@ impl Question for Drawing {
         }
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
         let assembly = (self.part == DrawnPart::Assembly).then_some(&design.assembly);
-        (&design.drive, design.parts_in_key(), &design.modification, design.profile.chord_tolerance_mm, assembly)
+        (design.drawn_in_key(), assembly)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedDrawing, NoAnswer> {
         let drawn = self.as_drawn(design);
         let (subject, design) = (self.part, &*drawn);
-        let of_design = (&design.drive, design.parts_in_key(), &design.modification, design.profile.chord_tolerance_mm);
+        let of_design = design.drawn_in_key();
         let parameters = design.drawing_parameters(limits.max_profile_points);
         let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
         let parts = design.parts_parameters()?;

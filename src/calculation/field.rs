@@ -1,9 +1,11 @@
 //! Fields of the design document: their pointers, and their kinds of error.
 
 use serde::Serialize;
-use toothwave_solver::violation::{Listed, Misfit, Modified, OfDutyPoint, Violation};
-use toothwave_solver::{Contact, Parameter, Part};
+use toothwave_solver::violation::{Listed, Misfit, Modified, OfDutyPoint, Range, Violation};
+use toothwave_solver::{Contact, Parameter};
 use utoipa::ToSchema;
+
+use crate::json::word;
 
 /// Error of a field.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -187,6 +189,12 @@ impl FieldError {
     }
 }
 
+/// Returns the pointer and the range of each number of the design document, of a list's entries those of the first.
+pub fn ranges() -> impl Iterator<Item = (String, Range)> {
+    let with_range = |parameter: Parameter| (pointer(parameter), parameter.range());
+    Parameter::all().into_iter().map(with_range).filter(|(_, range)| range.low.is_finite())
+}
+
 /// Returns the JSON pointer of a parameter in the design document.
 pub fn pointer(parameter: Parameter) -> String {
     match parameter {
@@ -206,8 +214,8 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::FlatLength => "/drive/teeth/flat_length_mm".into(),
         Parameter::RingTeeth => "/drive/ring/teeth".into(),
         Parameter::TipRadius => "/drive/ring/tip_radius_mm".into(),
-        Parameter::YoungsModulus(part) => format!("/materials/{}/youngs_modulus_gpa", part_name(part)),
-        Parameter::PoissonsRatio(part) => format!("/materials/{}/poissons_ratio", part_name(part)),
+        Parameter::YoungsModulus(part) => format!("/materials/{}/youngs_modulus_gpa", word(&part)),
+        Parameter::PoissonsRatio(part) => format!("/materials/{}/poissons_ratio", word(&part)),
         Parameter::InputTorque => "/load/input_torque_nm".into(),
         Parameter::OutputTorque => "/load/output_torque_nm".into(),
         Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
@@ -256,7 +264,7 @@ pub fn pointer(parameter: Parameter) -> String {
         Parameter::TensileStrength => "/parts/carrier/strength/tensile_strength_mpa".into(),
         Parameter::EnduranceLimit => "/parts/carrier/strength/endurance_limit_mpa".into(),
         Parameter::BoreRadius => "/parts/wave_generator/bore_radius_mm".into(),
-        Parameter::PartClearance(part) => format!("/parts/{}/clearance_um", part_name(part)),
+        Parameter::PartClearance(part) => format!("/parts/{}/clearance_um", word(&part)),
         Parameter::InputAngle => "/assembly/input_angle_deg".into(),
     }
 }
@@ -287,16 +295,6 @@ const fn listed_name(listed: Listed) -> &'static str {
         Listed::RingSpace => "ring_space_um",
         Listed::RingSpaceAngle => "ring_space_angle_arcsec",
         Listed::WaveGeneratorLobe => "wave_generator_lobe_um",
-    }
-}
-
-/// Returns the name of a part in documents.
-pub const fn part_name(part: Part) -> &'static str {
-    match part {
-        Part::WaveGenerator => "wave_generator",
-        Part::Teeth => "teeth",
-        Part::Ring => "ring",
-        Part::Carrier => "carrier",
     }
 }
 

@@ -9,7 +9,7 @@ use crate::columns;
 use crate::decimal_comma::DecimalComma;
 
 /// A format of an answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Format {
     /// JSON, for programs.
     Json,

@@ -13,7 +13,6 @@ use utoipa::ToSchema;
 use crate::design::Design;
 use crate::findings::{FindingAnswer, drive_findings, write_findings};
 use crate::forms::{Form, Format, Forms, csv_error};
-use crate::key::Encode;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, checked_drive, require_finite};
 
@@ -244,8 +243,8 @@ impl Question for Geometry {
         "geometry"
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        (&design.drive, &design.profile)
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
+        (design.drive_in_key(), &design.profile)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer> {

@@ -1,5 +1,6 @@
 //! The steps from a document to an answer, which all questions share.
 
+use serde::Serialize;
 use toothwave_solver::backing::Backings;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::{LoadCase, Parameter, SolveError, Violation, model_error};
@@ -7,7 +8,7 @@ pub use toothwave_solver::{Never, Stop};
 
 use crate::design::{Design, SeriesComplianceDocument};
 use crate::forms::{Format, Forms};
-use crate::key::{Encode, Key};
+use crate::key::Key;
 use crate::no_answer::NoAnswer;
 
 /// Limits of computations.
@@ -42,7 +43,7 @@ pub trait Question: Send + 'static {
     fn name(&self) -> &'static str;
 
     /// Returns the parts of a normalised document that the answer depends on.
-    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a;
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a;
 
     /// Checks these parts and reports every impossible value.
     ///
@@ -67,7 +68,7 @@ pub trait Question: Send + 'static {
     fn answer(checked: &Self::Checked, stop: &dyn Stop) -> Result<Self::Answer, NoAnswer>;
 
     /// Returns the key of the answer in this form. Equal keys mean equal bytes in every process.
-    fn key(&self, design: &Design, form: &impl Encode) -> Key {
+    fn key(&self, design: &Design, form: &impl Serialize) -> Key {
         Key::new(self.name(), &self.reads(design), form)
     }
 

@@ -13,6 +13,7 @@ mod plots;
 mod states;
 mod text;
 
+use serde::Serialize;
 use toothwave_solver::backing::{Backings, Shares};
 use toothwave_solver::fingers::CarrierFingers;
 use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, LossParameters, LossTotals, PointLosses};
@@ -26,7 +27,6 @@ use crate::design::{self, Design, ModelDocument};
 use crate::field::FieldCode;
 use crate::findings::{Causes, FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};
-use crate::key::Encode;
 use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
 use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
@@ -203,9 +203,10 @@ impl Question for Sweep {
         "sweep"
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
-        let Design { drive, materials, load, friction, modification, deviations, sweep, parts, .. } = design;
-        (drive, materials, load, friction, design.model_in_key(), (modification, deviations, sweep, parts.under_load()))
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
+        let Design { materials, load, friction, modification, deviations, sweep, parts, .. } = design;
+        let of_parts = (modification, deviations, parts.under_load());
+        (design.drive_in_key(), materials, load, friction, design.model_in_key(), of_parts, sweep)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {
@@ -353,7 +354,7 @@ impl Question for Sweep {
                 output_torque_nm: load.output_torque_nm(drive),
             },
             enters_under_load: drive.flank_limit().end != FlankEnd::RegularTip && !load.presses_corners(drive),
-            peaks: PerContact::of(|contact| (*peaks.get(contact)).into()),
+            peaks,
             teeth_in_mesh_per_zone: mesh.teeth_in_mesh(),
             loaded_teeth_per_zone: sweep.loaded_teeth(),
             wind_up: backlash

@@ -108,14 +108,6 @@ macro_rules! union {
             }
         }
 
-        impl $crate::key::Encode for $union {
-            fn encode(&self, encoder: &mut $crate::key::Encoder) {
-                match self {
-                    $(Self::$kind(fields) => ($word, fields).encode(encoder)),+
-                }
-            }
-        }
-
         impl $union {
             const BY_DEFAULT: &[&str] = &[$($by_default)?];
 

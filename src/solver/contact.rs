@@ -2,8 +2,10 @@
 
 use std::f64::consts::PI;
 
-/// A part with its own material.
+/// A part of the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "snake_case"), schema(as = BodyPart))]
 pub enum Part {
     /// The cam.
     WaveGenerator,
@@ -13,6 +15,13 @@ pub enum Part {
     Ring,
     /// The slotted annulus.
     Carrier,
+}
+
+impl Part {
+    /// Returns all parts.
+    pub const fn all() -> [Self; 4] {
+        [Self::WaveGenerator, Self::Teeth, Self::Ring, Self::Carrier]
+    }
 }
 
 /// A contact of a tooth with another part.
@@ -28,6 +37,11 @@ pub enum Contact {
 }
 
 impl Contact {
+    /// Returns all contacts.
+    pub const fn all() -> [Self; 3] {
+        [Self::WaveGenerator, Self::Ring, Self::Carrier]
+    }
+
     /// Returns the part that teeth touch there.
     pub const fn mate(self) -> Part {
         match self {
@@ -106,12 +120,14 @@ impl<T> PerContact<T> {
     }
 }
 
-/// An isotropic elastic material; by default steel.
+/// An isotropic elastic material.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(deny_unknown_fields, default, expecting = "an object"), schema(as = MaterialDocument))]
 pub struct Material {
-    /// Young's modulus E, in GPa.
+    /// Young's modulus E, in GPa. Default: 210 GPa.
     pub youngs_modulus_gpa: f64,
-    /// Poisson's ratio ν.
+    /// Poisson's ratio ν. Default: 0.3.
     pub poissons_ratio: f64,
 }
 
@@ -131,16 +147,18 @@ impl Default for Material {
     }
 }
 
-/// Materials of all parts; by default steel.
+/// Materials by part.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(deny_unknown_fields, default, expecting = "an object"), schema(as = MaterialsDocument))]
 pub struct Materials {
-    /// Material of the wave generator.
+    /// Material of the wave generator. Default: steel.
     pub wave_generator: Material,
-    /// Material of the teeth.
+    /// Material of the teeth. Default: steel.
     pub teeth: Material,
-    /// Material of the ring.
+    /// Material of the ring. Default: steel.
     pub ring: Material,
-    /// Material of the carrier.
+    /// Material of the carrier. Default: steel.
     pub carrier: Material,
 }
 

@@ -44,6 +44,7 @@ pub struct Placement {
 
 /// Part as prisms of one section. Teeth and the fingers between the carrier's slots have several placements.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Body {
     /// The part.
     pub part: Part,
@@ -62,6 +63,12 @@ pub struct DrawingParameters {
     pub max_points: u64,
     /// Angle of the wave generator, used only for an assembly.
     pub input_angle_deg: f64,
+}
+
+impl Default for DrawingParameters {
+    fn default() -> Self {
+        Self { chord_tolerance_mm: 1e-3, max_points: u64::MAX, input_angle_deg: 0.0 }
+    }
 }
 
 impl Subject {
@@ -113,7 +120,7 @@ impl Drawing {
     /// use toothwave_solver::{DriveParameters, Never};
     ///
     /// let draft = Draft::new(&DriveParameters::default()).unwrap();
-    /// let parameters = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 100_000, input_angle_deg: 0.0 };
+    /// let parameters = DrawingParameters { chord_tolerance_mm: 0.01, ..DrawingParameters::default() };
     /// let drawing = Drawing::new(&draft, Subject::Assembly, &PartsParameters::default(), &parameters).unwrap();
     /// let bodies = drawing.bodies(&Never).unwrap();
     /// assert!(bodies.len() >= 4);

@@ -94,6 +94,7 @@ impl SlotStress {
 
 /// Stress at the foot of the finger with the largest force.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct FingerStress {
     /// Moment at the foot.
     pub moment_nmm: f64,
@@ -107,6 +108,21 @@ pub struct FingerStress {
 
 impl CarrierFingers {
     /// Builds the fingers from their beam, which only drives with line contacts have.
+    ///
+    /// ```
+    /// use toothwave_solver::backing::{Backings, Support};
+    /// use toothwave_solver::drive::Draft;
+    /// use toothwave_solver::fingers::{CarrierFingers, FingerParameters};
+    /// use toothwave_solver::parts::PartsParameters;
+    /// use toothwave_solver::{DriveParameters, LoadParameters};
+    ///
+    /// let draft = Draft::new(&DriveParameters::default()).unwrap();
+    /// let (drive, load) = (draft.drive().unwrap(), LoadParameters::default());
+    /// let backings = Backings::of(&drive, &draft, &PartsParameters::default(), Support::default());
+    /// let beam = *backings.finger().unwrap();
+    /// let fingers = CarrierFingers::new(&drive, beam, FingerParameters::default(), &load).unwrap();
+    /// assert!(fingers.stress(1000.0, 280.0).largest_mpa > 0.0);
+    /// ```
     ///
     /// # Errors
     /// [`NotConverged`] from the geometry.
@@ -215,10 +231,10 @@ impl CarrierFingers {
             let mut peaks = *peaks.get(contact);
             peaks.stress_mpa.value *= self.stress_factor(contact);
             // A flat keeps its length, and has no shear.
-            if let Some(shear) = &mut peaks.shear {
+            if let (Some(stress_mpa), Some(depth_mm)) = (&mut peaks.shear_stress_mpa, &mut peaks.shear_depth_mm) {
                 peaks.half_width_mm *= root;
-                shear.stress_mpa *= root;
-                shear.depth_mm *= root;
+                *stress_mpa *= root;
+                *depth_mm *= root;
             }
             peaks
         })
@@ -231,7 +247,7 @@ impl CarrierFingers {
 
     /// Returns the states with their stresses at the most loaded place along the teeth.
     pub fn states_along(&self, mut states: States) -> States {
-        for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
+        for contact in Contact::all() {
             let factor = self.stress_factor(contact);
             states.stress_mpa.get_mut(contact).iter_mut().for_each(|stress_mpa| *stress_mpa *= factor);
         }

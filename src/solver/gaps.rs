@@ -13,37 +13,48 @@ use crate::violation::{Listed, Modified, Parameter, Violation};
 pub(crate) const MM_PER_UM: f64 = 1e-3;
 pub(crate) const RAD_PER_ARCSEC: f64 = PI / 648_000.0;
 
-/// Intended differences from conjugate parts, equal for all teeth. Angles are positive away from the flank under load.
+/// Modification: intentional differences of the parts from the conjugate shape, the same for all teeth, with
+/// `virtual_work` only. A positive value opens a gap. A positive angle is a rotation away from the flank under load.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(deny_unknown_fields, default, expecting = "an object"), schema(as = ModificationDocument))]
 pub struct Modification {
-    /// Set-back of the ring's profile along its normals.
+    /// Offset of the ring's profile along its normals, in µm. Default: 0 µm.
     pub ring_equidistant_um: f64,
-    /// Outward shift of the path that generates the ring, along its radii.
+    /// Outward shift of the path that generates the ring, along its radii, in µm. Default: 0 µm.
     pub ring_path_shift_um: f64,
-    /// Outward shift of the ring's profile along its own radii.
+    /// Outward shift of the ring's profile, along its own radii, in µm. Default: 0 µm.
     pub ring_profile_shift_um: f64,
-    /// Rotation of the ring's flanks about the axis.
+    /// Rotation of the ring's flanks about the axis, in arcsec. Default: 0 arcsec.
     pub ring_rotation_arcsec: f64,
-    /// Set-back of the wave generator along its normals.
+    /// Offset of the wave generator along its normals, in µm. Default: 0 µm.
     pub wave_generator_equidistant_um: f64,
-    /// Set-back of the slots' walls.
+    /// Offset of the slots' walls, in µm. Default: 0 µm.
     pub slot_wall_um: f64,
-    /// Rotation of the carrier about the axis.
+    /// Rotation of the carrier about the axis, in arcsec. Default: 0 arcsec.
     pub carrier_rotation_arcsec: f64,
-    /// Reduction of the tooth radius.
+    /// Reduction of the teeth's radius, in µm. Default: 0 µm.
     pub tooth_radius_um: f64,
-    /// Set-back of the ring's flank towards its tip.
+    /// Tip relief: offset of the ring's flank towards its tip. Default: no relief.
+    #[cfg_attr(
+        feature = "document",
+        serde(deserialize_with = "crate::given", skip_serializing_if = "Option::is_none"),
+        schema(nullable = false)
+    )]
     pub ring_tip_relief: Option<TipRelief>,
 }
 
-/// Tip relief: `C ((ψ - ψ_t)/(ψ_e - ψ_t))^n` beyond ψ_t.
+/// Tip relief: the flank is offset by C ((ψ - ψ_t)/(ψ_e - ψ_t))^n for tooth positions ψ above ψ_t. ψ_e is the flank's
+/// end.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(deny_unknown_fields, expecting = "an object"), schema(as = TipReliefDocument))]
 pub struct TipRelief {
-    /// `C`: relief at the flank's end.
+    /// Amount C at the flank's end, in µm.
     pub amount_um: f64,
-    /// `ψ_t`: position where the relief starts.
+    /// Start ψ_t: tooth position from the middle of the lobe, in deg. It must be before the flank's end.
     pub start_deg: f64,
-    /// `n`: exponent.
+    /// Power n.
     pub power: f64,
 }
 
@@ -66,12 +77,14 @@ pub struct Deviations {
     pub runout: PerContact<Runout>,
 }
 
-/// Offset of a part from the axis.
+/// Runout: distance of a part's centre from the axis, in a direction that is fixed in the part.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(deny_unknown_fields, default, expecting = "an object"), schema(as = RunoutDocument))]
 pub struct Runout {
-    /// Distance from the axis.
+    /// Distance from the axis, in µm. Default: 0 µm.
     pub amount_um: f64,
-    /// Direction, fixed in the part: from the major axis of lobe 0, the middle of ring space 0, or slot 0.
+    /// Direction, in deg. Default: 0 deg.
     pub angle_deg: f64,
 }
 

@@ -60,8 +60,12 @@
 //! | backlash | [`backlash::of`] |
 //! | losses, wear, duty, life of the bearing | [`losses::period::Losses::of`], [`losses::duty::DutySweep`] |
 //! | compliance behind the contacts | [`backing::Backings`] |
+//! | strength of the carrier, load along its teeth | [`fingers::CarrierFingers`] |
 //! | profiles and drawings | [`profile::profiles`], [`drawing::Drawing`] |
 //! | warnings, expected error of the model | [`findings`], [`model_error::of`] |
+//!
+//! Parameters are built with `..Default::default()`, so that a later field changes no caller. Enums are exhaustive, so
+//! that a match over violations, findings or errors shows what a later version adds.
 
 #[doc(hidden)]
 pub mod approach;
@@ -230,6 +234,20 @@ impl SolveError {
             other => other,
         }
     }
+}
+
+/// Deserializes a field that may be left out but not be null.
+///
+/// # Errors
+/// Those of the field's type.
+#[cfg(feature = "document")]
+#[doc(hidden)]
+pub fn given<'de, D, T>(deserializer: D) -> Result<Option<T>, D::Error>
+where
+    D: serde::Deserializer<'de>,
+    T: serde::Deserialize<'de>,
+{
+    T::deserialize(deserializer).map(Some)
 }
 
 /// Stop signal, polled during a computation. If it is set, the computation returns [`SolveError::Stopped`]. It is

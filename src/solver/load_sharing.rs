@@ -8,9 +8,10 @@ mod tooth_state;
 
 #[doc(hidden)]
 pub use capacity::{LawEnd, TorqueLimit};
+pub use equilibrium::Compatibility;
+#[doc(hidden)]
+pub use equilibrium::ToothState;
 pub(crate) use equilibrium::{curvature_per_mm, force_ratio};
-pub use load::{Compatibility, LoadCase, LoadParameters, Torque};
+pub use load::{LoadCase, LoadParameters, Torque};
 #[doc(hidden)]
 pub use loaded_drive::LoadedDrive;
-#[doc(hidden)]
-pub use tooth_state::ToothState;

@@ -285,7 +285,7 @@ impl Mechanism {
     fn least_slip(&self, slip: &PerContact<f64>, limit_n: &PerContact<f64>) -> ToothSlip {
         let rolls = if self.tooth_spins {
             let weighted = |of| Weighted { place: *slip.get(of), weight: *limit_n.get(of), of };
-            let mut places = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier].map(weighted);
+            let mut places = Contact::all().map(weighted);
             weighted_median(&mut places).map(|median| median.of)
         } else {
             None

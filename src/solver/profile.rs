@@ -15,10 +15,13 @@ use crate::{SolveError, Stop};
 /// A polyline in mm.
 pub type Polyline = Vec<Point2<f64>>;
 
-/// Extent of the ring.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Part of the ring to draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "snake_case"), schema(as = ExtentDocument))]
 pub enum Extent {
-    /// From one tooth's symmetry line to the next, angles ∓π/Z_K.
+    /// From one tooth's symmetry line to the next, angles ∓π/Z_K, so that copies join.
+    #[default]
     Tooth,
     /// The closed ring, its last point equal to its first.
     Full,
@@ -33,6 +36,12 @@ pub struct ProfileParameters {
     pub extent: Extent,
     /// Largest number of points over all profiles.
     pub max_points: u64,
+}
+
+impl Default for ProfileParameters {
+    fn default() -> Self {
+        Self { chord_tolerance_mm: 1e-3, extent: Extent::default(), max_points: u64::MAX }
+    }
 }
 
 /// Profiles of the mating parts.
@@ -93,7 +102,7 @@ const MAX_DEPTH: u32 = 40;
 /// # use toothwave_solver::{Drive, DriveParameters, Never};
 /// let drive = Drive::new(&DriveParameters::default()).unwrap();
 ///
-/// let parameters = ProfileParameters { chord_tolerance_mm: 1e-3, extent: Extent::Full, max_points: 100_000 };
+/// let parameters = ProfileParameters { extent: Extent::Full, ..ProfileParameters::default() };
 /// let ring = profiles(&drive, &parameters, &Never).unwrap().ring;
 /// assert_eq!(ring.first(), ring.last());
 /// ```

@@ -115,19 +115,19 @@ pub struct MapDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct OverDocument {
     /// Smallest value.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub min: Option<f64>,
     /// Largest value.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub max: Option<f64>,
     /// Number of equidistant values, both ends included. Default for a whole number: every value.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 1, maximum = 1000000, required = false)]
     pub steps: Option<Whole>,
     /// List of values, instead of a range.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub one_of: Option<Vec<ChoiceDocument>>,
 }
@@ -216,15 +216,15 @@ pub struct SearchDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct FreeDocument {
     /// Smallest value.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub min: Option<f64>,
     /// Largest value.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub max: Option<f64>,
     /// List of values, instead of a range.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub one_of: Option<Vec<ChoiceDocument>>,
 }
@@ -245,11 +245,11 @@ pub enum RequireDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct RangeDocument {
     /// Smallest allowed value.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub min: Option<f64>,
     /// Largest allowed value.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub max: Option<f64>,
 }
@@ -316,11 +316,11 @@ pub struct SensitivityDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct InputDocument {
     /// Step in the unit of the input.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0, nullable = false)]
     pub plus_minus: Option<f64>,
     /// Step as a fraction of the value, instead of `plus_minus`.
-    #[serde(deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0, maximum = 1.0, nullable = false)]
     pub relative: Option<f64>,
 }
@@ -361,11 +361,11 @@ pub struct DistributionDocument {
     /// Kind of distribution.
     pub distribution: DistributionKind,
     /// Standard deviation of the normal distribution before truncation.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0, nullable = false)]
     pub sigma: Option<f64>,
     /// Largest deviation: the normal distribution is truncated here, the uniform one ends here.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(exclusive_minimum = 0.0, nullable = false)]
     pub limit: Option<f64>,
 }
@@ -378,11 +378,6 @@ pub enum DistributionKind {
     Normal,
     /// Uniform from `-limit` to `limit`.
     Uniform,
-}
-
-/// Deserializes a field that may be absent but not null.
-fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
-    T::deserialize(deserializer).map(Some)
 }
 
 const fn default_evaluations() -> Whole {

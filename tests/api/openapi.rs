@@ -5,8 +5,7 @@ use std::sync::LazyLock;
 
 use serde_json::{Value, json};
 use toothwave_calculation::field::pointer;
-use toothwave_solver::violation::{Listed, Modified, OfDutyPoint};
-use toothwave_solver::{Contact, Parameter, Part};
+use toothwave_solver::Parameter;
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Limits, Question, Service};
 use crate::codes::{field_codes, finding_codes, problem_codes, words};
@@ -263,94 +262,6 @@ fn problems_are_problem_json_with_retry_after() {
     }
 }
 
-/// Lists every parameter that has a range.
-fn parameters() -> Vec<Parameter> {
-    let parts = [Part::WaveGenerator, Part::Teeth, Part::Ring, Part::Carrier];
-    let contacts = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
-    let mut parameters = vec![
-        Parameter::SemiMajor,
-        Parameter::SemiMinor,
-        Parameter::EccentricRadius,
-        Parameter::Eccentricity,
-        Parameter::Lobes,
-        Parameter::HarmonicLobes,
-        Parameter::MeanRadius,
-        Parameter::MeanPathRadius,
-        Parameter::Amplitude,
-        Parameter::ToothCount,
-        Parameter::InstalledTeeth,
-        Parameter::ToothRadius,
-        Parameter::ToothWidth,
-        Parameter::FlatLength,
-        Parameter::RingTeeth,
-        Parameter::TipRadius,
-        Parameter::InputTorque,
-        Parameter::OutputTorque,
-        Parameter::AllowableStress,
-        Parameter::InputSpeed,
-        Parameter::BearingLoadRating,
-        Parameter::BearingCoefficient,
-        Parameter::BearingRadius,
-        Parameter::Samples,
-        Parameter::SweepTolerance,
-        Parameter::RequestedError,
-        Parameter::ChordTolerance,
-        Parameter::RingOuterRadius,
-        Parameter::CarrierInnerRadius,
-        Parameter::CarrierOuterRadius,
-        Parameter::FingerFilletRadius,
-        Parameter::YieldStrength,
-        Parameter::TensileStrength,
-        Parameter::EnduranceLimit,
-        Parameter::BoreRadius,
-        Parameter::InputAngle,
-    ];
-    parameters.extend(parts.map(Parameter::YoungsModulus));
-    parameters.extend(parts.map(Parameter::PoissonsRatio));
-    parameters.extend(contacts.map(Parameter::GrooveRadius));
-    parameters.extend(contacts.map(Parameter::FrictionCoefficient));
-    parameters.extend(contacts.map(Parameter::WearRate));
-    parameters.extend(contacts.map(Parameter::AllowableStressAt));
-    let of_duty =
-        [OfDutyPoint::InputTorque, OfDutyPoint::OutputTorque, OfDutyPoint::InputSpeed, OfDutyPoint::ShareOfTime];
-    parameters.extend(of_duty.map(|of| Parameter::Duty(of, 0)));
-    parameters.extend(contacts.map(Parameter::Depth));
-    parameters.extend(contacts.map(Parameter::SeriesCompliance));
-    parameters.extend(contacts.map(Parameter::Stiffness));
-    parameters.extend(contacts.map(Parameter::Clearance));
-    parameters.extend(parts.map(Parameter::PartClearance));
-    parameters.extend(
-        [
-            Modified::RingEquidistant,
-            Modified::RingPathShift,
-            Modified::RingProfileShift,
-            Modified::RingRotation,
-            Modified::WaveGeneratorEquidistant,
-            Modified::SlotWall,
-            Modified::CarrierRotation,
-            Modified::ToothRadius,
-            Modified::TipReliefAmount,
-            Modified::TipReliefStart,
-            Modified::TipReliefPower,
-        ]
-        .map(Parameter::Modification),
-    );
-    parameters.extend(
-        [
-            Listed::ToothRadius,
-            Listed::SlotAngle,
-            Listed::SlotWall,
-            Listed::RingSpace,
-            Listed::RingSpaceAngle,
-            Listed::WaveGeneratorLobe,
-        ]
-        .map(|listed| Parameter::Deviation(listed, 0)),
-    );
-    parameters.extend(contacts.map(Parameter::RunoutAmount));
-    parameters.extend(contacts.map(Parameter::RunoutAngle));
-    parameters
-}
-
 /// Returns the schemas of a schema's fields by name. Follows references and alternatives.
 fn fields_of<'a>(document: &'a Value, schema: &'a Value) -> Vec<(&'a str, &'a Value)> {
     let mut fields = Vec::new();
@@ -400,7 +311,8 @@ fn is_numeric(schema: &Value) -> bool {
 fn every_number_has_the_checked_range() {
     let document = document();
     let all = below(document, &document["components"]["schemas"]["Design"], "");
-    let parameters = parameters();
+    let is_of_number = |of: &Parameter| of.range().low.is_finite() && *of != Parameter::DutyPoints;
+    let parameters: Vec<_> = Parameter::all().into_iter().filter(is_of_number).collect();
     for parameter in &parameters {
         let pointer = pointer(*parameter);
         let bounds = ["minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"];

@@ -1,6 +1,10 @@
 //! The documented ranges. Both ends are accepted, and values just beyond are refused.
 
+use std::collections::HashMap;
+
 use serde_json::{Value, json};
+use toothwave_calculation::field::ranges;
+use toothwave_solver::violation::Range;
 
 use crate::asking::{LIMITS, Limits, Service};
 use crate::designs::{eccentric, every_number, fixed, spelled_out, with};
@@ -16,15 +20,14 @@ struct Field {
 }
 
 fn fields() -> Vec<Field> {
-    let field = |pointer: &str, low, high| Field {
-        pointer: pointer.into(),
-        path: "/v1/sweep",
-        document: every_number(),
-        low,
-        high,
-        is_whole: false,
+    let ranges: HashMap<_, _> = ranges().collect();
+    let field = |pointer: &str| {
+        let first = |name| if str::parse::<u32>(name).is_ok() { "0" } else { name };
+        let Range { low, high, .. } = ranges[&pointer.split('/').map(first).collect::<Vec<_>>().join("/")];
+        let pointer = pointer.into();
+        Field { pointer, path: "/v1/sweep", document: every_number(), low, high, is_whole: false }
     };
-    let count = |pointer: &str, high| Field { is_whole: true, ..field(pointer, 2.0, high) };
+    let count = |pointer: &str| Field { is_whole: true, ..field(pointer) };
     let mut fields: Vec<_> = [
         "/drive/wave_generator/semi_major_mm",
         "/drive/wave_generator/semi_minor_mm",
@@ -32,48 +35,41 @@ fn fields() -> Vec<Field> {
         "/drive/teeth/width_mm",
         "/drive/ring/tip_radius_mm",
     ]
-    .map(|pointer| field(pointer, 1e-6, 1e6))
+    .map(field)
     .into();
-    fields.push(Field { path: "/v1/geometry", ..field("/profile/chord_tolerance_mm", 1e-6, 1e6) });
+    fields.push(Field { path: "/v1/geometry", ..field("/profile/chord_tolerance_mm") });
     let made = crate::drawings::made(r#"{ "wave_generator": {}, "teeth": {}, "ring": {}, "carrier": {} }"#);
-    let part = |pointer: &str, low, high| Field {
-        path: "/v1/drawings/assembly",
-        document: made.clone(),
-        ..field(pointer, low, high)
-    };
-    fields.push(part("/assembly/input_angle_deg", -1e7, 1e7));
+    let part = |pointer: &str| Field { path: "/v1/drawings/assembly", document: made.clone(), ..field(pointer) };
+    fields.push(part("/assembly/input_angle_deg"));
     fields.extend(
         ["ring/outer_radius_mm", "carrier/inner_radius_mm", "carrier/outer_radius_mm", "wave_generator/bore_radius_mm"]
-            .map(|field| part(&format!("/parts/{field}"), 1e-6, 1e6)),
+            .map(|field| part(&format!("/parts/{field}"))),
     );
     fields.extend(
-        ["wave_generator", "teeth", "ring", "carrier"]
-            .map(|name| part(&format!("/parts/{name}/clearance_um"), 0.0, 1e6)),
+        ["wave_generator", "teeth", "ring", "carrier"].map(|name| part(&format!("/parts/{name}/clearance_um"))),
     );
-    fields.extend(
-        ["/drive/teeth/count", "/drive/teeth/installed", "/drive/ring/teeth"].map(|pointer| count(pointer, 1e4)),
-    );
-    fields.push(Field { low: 1.0, ..count("/sweep/samples", 1e7) });
-    fields.push(field("/load/input_torque_nm", 1e-12, 1e15));
+    fields.extend(["/drive/teeth/count", "/drive/teeth/installed", "/drive/ring/teeth"].map(count));
+    fields.push(count("/sweep/samples"));
+    fields.push(field("/load/input_torque_nm"));
     let by_output = with(&every_number(), "/load", json!({ "output_torque_nm": 280.0 }));
-    fields.push(Field { document: by_output, ..field("/load/output_torque_nm", 1e-12, 1e15) });
+    fields.push(Field { document: by_output, ..field("/load/output_torque_nm") });
     let bearing = json!({
         "kind": "race", "coefficient": 0.05, "bearing_coefficient": 0.002, "bearing_radius_mm": 52.0
     });
     let rubbing = with(&every_number(), "/friction", crate::friction::on(&bearing));
     let rubbing = with(&rubbing, "/load/input_speed_rpm", json!(1500.0));
-    let of_friction = |pointer: &str, low, high| Field { document: rubbing.clone(), ..field(pointer, low, high) };
-    fields.push(of_friction("/load/input_speed_rpm", 1e-6, 1e6));
+    let of_friction = |pointer: &str| Field { document: rubbing.clone(), ..field(pointer) };
+    fields.push(of_friction("/load/input_speed_rpm"));
     for pointer in
         ["wave_generator/coefficient", "wave_generator/bearing_coefficient", "ring/coefficient", "carrier/coefficient"]
     {
-        fields.push(of_friction(&format!("/friction/{pointer}"), 0.0, 1.0));
+        fields.push(of_friction(&format!("/friction/{pointer}")));
     }
-    fields.push(of_friction("/friction/wave_generator/bearing_radius_mm", 1e-6, 1e6));
+    fields.push(of_friction("/friction/wave_generator/bearing_radius_mm"));
     let worn = with(&rubbing, "/friction/wear_rate_mm3_per_nm", json!({}));
     for contact in ["wave_generator", "ring", "carrier"] {
         let pointer = format!("/friction/wear_rate_mm3_per_nm/{contact}");
-        fields.push(Field { document: worn.clone(), ..field(&pointer, 0.0, 1e3) });
+        fields.push(Field { document: worn.clone(), ..field(&pointer) });
     }
     let wave_generator = json!({
         "kind": "race", "coefficient": 0.05, "bearing_coefficient": 0.002, "bearing_radius_mm": 25.0,
@@ -82,15 +78,15 @@ fn fields() -> Vec<Field> {
     let rated = with(&eccentric(), "/friction", crate::friction::on(&wave_generator));
     let rated = with(&rated, "/load/input_speed_rpm", json!(1500.0));
     let pointer = "/friction/wave_generator/bearing_load_rating_n";
-    fields.push(Field { document: rated, ..field(pointer, 1e-3, 1e12) });
+    fields.push(Field { document: rated, ..field(pointer) });
     let own = json!({ "wave_generator": 900.0, "ring": 1000.0, "carrier": 500.0 });
     let limited = with(&every_number(), "/load/allowable_stress_mpa", own);
     for contact in ["wave_generator", "ring", "carrier"] {
         let pointer = format!("/load/allowable_stress_mpa/{contact}");
-        fields.push(Field { document: limited.clone(), ..field(&pointer, 1e-3, 1e6) });
+        fields.push(Field { document: limited.clone(), ..field(&pointer) });
     }
     for part in ["wave_generator", "teeth", "ring", "carrier"] {
-        fields.push(field(&format!("/materials/{part}/youngs_modulus_gpa"), 1e-3, 1e5));
+        fields.push(field(&format!("/materials/{part}/youngs_modulus_gpa")));
     }
     let modified = with(
         &with(&spelled_out(), "/model", json!({ "compatibility": "virtual_work" })),
@@ -99,19 +95,16 @@ fn fields() -> Vec<Field> {
             "ring_tip_relief": { "amount_um": 1.0, "start_deg": 60.0, "power": 2.0 }
         }),
     );
-    let modification = |name: &str, low, high| Field {
-        document: modified.clone(),
-        ..field(&format!("/modification/{name}"), low, high)
-    };
+    let modification = |name: &str| Field { document: modified.clone(), ..field(&format!("/modification/{name}")) };
     for name in ["ring_equidistant", "ring_path_shift", "ring_profile_shift", "wave_generator_equidistant", "slot_wall"]
     {
-        fields.push(modification(&format!("{name}_um"), -1e6, 1e6));
+        fields.push(modification(&format!("{name}_um")));
     }
-    fields.push(modification("tooth_radius_um", -1e6, 1e6));
-    fields.push(modification("ring_rotation_arcsec", -1e5, 1e5));
-    fields.push(modification("carrier_rotation_arcsec", -1e5, 1e5));
-    fields.push(modification("ring_tip_relief/amount_um", -1e6, 1e6));
-    fields.push(modification("ring_tip_relief/power", 0.1, 100.0));
+    fields.push(modification("tooth_radius_um"));
+    fields.push(modification("ring_rotation_arcsec"));
+    fields.push(modification("carrier_rotation_arcsec"));
+    fields.push(modification("ring_tip_relief/amount_um"));
+    fields.push(modification("ring_tip_relief/power"));
     // Testing each entry would need another document each.
     let items = |count: usize| vec![0.0; count];
     let deviating = with(
@@ -123,21 +116,18 @@ fn fields() -> Vec<Field> {
             "wave_generator_runout": {}, "ring_runout": {}, "carrier_runout": {}
         }),
     );
-    let deviation = |name: &str, low, high| Field {
-        document: deviating.clone(),
-        ..field(&format!("/deviations/{name}"), low, high)
-    };
+    let deviation = |name: &str| Field { document: deviating.clone(), ..field(&format!("/deviations/{name}")) };
     for name in ["tooth_radius_um/27", "slot_wall_um/0", "ring_space_um/25", "wave_generator_lobe_um/1"] {
-        fields.push(deviation(name, -1e6, 1e6));
+        fields.push(deviation(name));
     }
-    fields.push(deviation("slot_angle_arcsec/3", -1e5, 1e5));
-    fields.push(deviation("ring_space_angle_arcsec/7", -1e5, 1e5));
+    fields.push(deviation("slot_angle_arcsec/3"));
+    fields.push(deviation("ring_space_angle_arcsec/7"));
     for contact in ["wave_generator", "ring", "carrier"] {
-        fields.push(deviation(&format!("{contact}_runout/amount_um"), 0.0, 1e6));
-        fields.push(deviation(&format!("{contact}_runout/angle_deg"), -360.0, 360.0));
+        fields.push(deviation(&format!("{contact}_runout/amount_um")));
+        fields.push(deviation(&format!("{contact}_runout/angle_deg")));
     }
     for contact in ["wave_generator", "ring", "carrier"] {
-        fields.push(field(&format!("/model/stiffness/{contact}_n_per_mm"), 1e-3, 1e15));
+        fields.push(field(&format!("/model/stiffness/{contact}_n_per_mm")));
     }
     fields
 }

@@ -1,35 +1,27 @@
 //! Random documents made from the schema of the design document.
 
-use serde_json::{Map, Value, json};
-use toothwave_calculation::design::Design;
-use utoipa::openapi::{RefOr, schema::Schema};
-use utoipa::{PartialSchema as _, ToSchema as _};
+use std::sync::LazyLock;
 
-/// The schema of the design document with all its references.
-pub(crate) struct Schemas {
-    design: Value,
-    by_name: Map<String, Value>,
-}
+use serde_json::{Value, json};
+
+/// The schemas of the API document.
+pub(crate) struct Schemas(&'static Value);
 
 impl Schemas {
     pub(crate) fn new() -> Self {
-        let mut named: Vec<(String, RefOr<Schema>)> = Vec::new();
-        Design::schemas(&mut named);
-        let json = |schema: &RefOr<Schema>| serde_json::to_value(schema).unwrap();
-        Self {
-            design: json(&Design::schema()),
-            by_name: named.iter().map(|(name, schema)| (name.clone(), json(schema))).collect(),
-        }
+        static DOCUMENT: LazyLock<Value> =
+            LazyLock::new(|| serde_json::from_str(include_str!("../../openapi/openapi.json")).unwrap());
+        Self(&DOCUMENT["components"]["schemas"])
     }
 
     /// Returns a document with all required fields and a random choice of optional ones.
     pub(crate) fn document(&self, chance: &mut Chance) -> Value {
-        self.value(&self.design, chance)
+        self.value(&self.0["Design"], chance)
     }
 
     fn value(&self, schema: &Value, chance: &mut Chance) -> Value {
         if let Some(name) = schema["$ref"].as_str().and_then(|reference| reference.rsplit('/').next()) {
-            return self.value(&self.by_name[name], chance);
+            return self.value(&self.0[name], chance);
         }
         for alternatives in ["oneOf", "anyOf"] {
             if let Some(alternatives) = schema[alternatives].as_array() {

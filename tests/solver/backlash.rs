@@ -15,8 +15,6 @@ use crate::deviations::{ALL_KINDS, deviations, drives};
 use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse, everywhere, load};
 
 const ARCSEC: f64 = PI / 648_000.0;
-const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
-
 fn with_clearance(clearance_um: PerContact<f64>) -> LoadParameters {
     LoadParameters { clearance_um, ..load(20.0, Compatibility::VirtualWork) }
 }
@@ -63,7 +61,7 @@ fn without_gaps_there_is_none() {
 #[test]
 fn gaps_alone_have_less_than_together() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, ECCENTRIC] {
-        let alone = CONTACTS.map(|contact| with_gap(&p, only(contact, 10.0)).mean_rad);
+        let alone = Contact::all().map(|contact| with_gap(&p, only(contact, 10.0)).mean_rad);
         let together = with_gap(&p, everywhere(10.0)).mean_rad;
         assert!(alone.iter().sum::<f64>() < together, "{alone:?} {together}");
     }
@@ -77,7 +75,7 @@ fn contributions_are_derivatives_of_the_mean() {
         let found = with_gap(&p, gaps_um);
         let sum: f64 = found.contribution_rad.iter().map(|(_, part)| part).sum();
         assert!((sum / found.mean_rad - 1.0).abs() < 1e-14);
-        for contact in CONTACTS {
+        for contact in Contact::all() {
             let changed = |factor: f64| {
                 let gap = |other: Contact| gaps_um.get(other) * if other == contact { factor } else { 1.0 };
                 with_gap(&p, PerContact::of(gap)).mean_rad

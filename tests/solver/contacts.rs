@@ -108,7 +108,7 @@ fn projection_takes_gaps_of_positive_weight_only() {
     for (parameters, refused) in
         [(PAPER_5_1, [false, false, false]), (backwards, [false, false, true]), (steep, [false, true, false])]
     {
-        let contacts = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
+        let contacts = Contact::all();
         assert_eq!(contacts.map(|contact| is_refused(&parameters, contact)), refused, "{parameters:?}");
     }
 }

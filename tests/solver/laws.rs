@@ -74,8 +74,6 @@ fn directions(drive: &Drive, tooth: &ToothState) -> [Vector2<f64>; 3] {
     ]
 }
 
-const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
-
 /// Returns the force for an approach, by bisection in its logarithm.
 fn force_of(approach_mm: f64, law: impl Fn(f64) -> f64) -> f64 {
     if approach_mm <= 0.0 {
@@ -110,15 +108,15 @@ fn free_tooth(
     };
     let forces = |v: Vector2<f64>| {
         let pressed = pressed(v);
-        [0, 1, 2].map(|i| force_of(pressed[i], |force_n| law(CONTACTS[i], tooth, force_n)))
+        [0, 1, 2].map(|i| force_of(pressed[i], |force_n| law(Contact::all()[i], tooth, force_n)))
     };
     let stiffness = |i: usize, force_n: f64| {
         let step = 1e-5 * force_n;
-        2.0 * step / (law(CONTACTS[i], tooth, force_n + step) - law(CONTACTS[i], tooth, force_n - step))
+        2.0 * step / (law(Contact::all()[i], tooth, force_n + step) - law(Contact::all()[i], tooth, force_n - step))
     };
     // Starts with the shares of statics, so that all three contacts press.
     let mut v = {
-        let reach = |ratio: f64, i: usize, f: f64| law(CONTACTS[i], tooth, f * ratio);
+        let reach = |ratio: f64, i: usize, f: f64| law(Contact::all()[i], tooth, f * ratio);
         let ratio = tooth.force_ratio;
         let (mut low, mut high) = (1e-12_f64, 1e7_f64);
         for _ in 0..200 {
@@ -232,7 +230,7 @@ fn approach_follows_johnsons_printed_formula() {
     for degrees in [0.0_f64, 1e-6, 10.0, 45.0, 80.0] {
         let tooth = loaded.tooth(Position::from_lobe(degrees.to_radians(), 2)).unwrap();
         for force_n in [1e-9, 1.0, 1e3, 1e4] {
-            let printed: f64 = CONTACTS
+            let printed: f64 = Contact::all()
                 .iter()
                 .map(|&contact| {
                     let (ratio, curvature) = (*tooth.force_ratio.get(contact), *tooth.curvature_per_mm.get(contact));
@@ -277,7 +275,7 @@ fn johnsons_law_balances_any_torque_and_gap() {
     for parameters in [PAPER_5_1, PAPER_5_2] {
         for exponent in [-12, -8, -4, 0, 1] {
             for gap_um in [0.0, 1e-6, 1.0, 1e3, 1e6] {
-                for contact in CONTACTS {
+                for contact in Contact::all() {
                     let load = LoadParameters {
                         clearance_um: PerContact::of(|at| if at == contact { gap_um } else { 0.0 }),
                         ..johnson(10.0_f64.powi(exponent))
@@ -522,7 +520,7 @@ fn ball_contact_shear_is_larger_bodys() {
     let (one, other, soft) = (peaks(0.2, 0.4), peaks(0.4, 0.2), peaks(0.4, 0.4));
     for (contact, one) in one.iter() {
         let [one, other, soft] = [one, other.get(contact), soft.get(contact)]
-            .map(|peaks| peaks.shear.unwrap().stress_mpa / peaks.stress_mpa.value);
+            .map(|peaks| peaks.shear_stress_mpa.unwrap() / peaks.stress_mpa.value);
         assert!((one / other - 1.0).abs() < 1e-9, "{contact:?}: {one} {other}");
         assert!(one > 1.01 * soft, "{contact:?}: {one} {soft}");
     }

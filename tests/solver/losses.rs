@@ -25,8 +25,6 @@ use toothwave_solver::{
 use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, everywhere, load};
 use crate::reference::number;
 
-const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
-
 /// One input angle of a drive in friction.json.
 struct Case(Value);
 
@@ -138,7 +136,7 @@ fn losses_match_exact_equilibrium_with_vanishing_friction() {
                     rolls == Some(code(contact)) || expected.get(contact).abs() < 1e-10 * way && rolls.is_some()
                 };
                 assert!(slip.rolls.map_or(rolls.is_none(), is_named), "{name}: {:?} rolls, not {rolls:?}", slip.rolls);
-                for contact in CONTACTS {
+                for contact in Contact::all() {
                     let what = format!("{name}: slip of tooth {index} at {contact:?}");
                     assert_near(*slip.slip_mm_per_rad.get(contact), *expected.get(contact), 1e-13 * way, &what);
                     compared += 1;
@@ -149,7 +147,7 @@ fn losses_match_exact_equilibrium_with_vanishing_friction() {
             }
             let zones = mechanism.zones_in_torque();
             let lost = turning.lost_nmm_per_rad();
-            for contact in CONTACTS {
+            for contact in Contact::all() {
                 let expected = zones * number(&limit["work_nmm_per_rad"][code(contact)]).unwrap();
                 let what = format!("{name}: work at {contact:?}");
                 assert_near(*turning.work_nmm_per_rad.get(contact), expected, 1e-12 * lost, &what);
@@ -281,7 +279,7 @@ fn contact_point_moves_along_each_curve() {
         for (tooth, row) in case.teeth().iter().zip(placed) {
             let found = case.mechanism(true).advance_mm_per_rad(tooth);
             let expected = per_contact(&row["advance_mm_per_rad"]);
-            for contact in CONTACTS {
+            for contact in Contact::all() {
                 let expected = *expected.get(contact);
                 let what = format!("{} at {contact:?}", case.name());
                 // 1 + rκ has half a unit of error in its last place.
@@ -756,7 +754,7 @@ fn period_loss_is_mean_over_input_angles() {
                 .collect();
             assert_eq!(slips.len(), sweep.states.len());
             for (state, slip) in slips.iter().enumerate() {
-                for contact in CONTACTS {
+                for contact in Contact::all() {
                     let found = losses.slip_mm_per_rad.get(contact)[state];
                     assert_near(found, *slip.slip_mm_per_rad.get(contact), 1e-10, "slip");
                 }
@@ -782,10 +780,11 @@ fn losses_equal_force_times_slip_with_moving_generator() {
     let states = &sweep.states;
     for (&angle_deg, &loss_ratio) in sweep.input_angles.input_angle_deg.iter().zip(&losses.loss_ratio) {
         let of_angle = (0..states.len()).filter(|&state| states.input_angle_deg[state] == angle_deg);
-        let lost_nmm = of_angle.flat_map(|state| CONTACTS.map(|contact| (state, contact))).map(|(state, contact)| {
-            let slip_mm = losses.slip_mm_per_rad.get(contact)[state].abs();
-            coefficient.get(contact) * states.force_n.get(contact)[state] * slip_mm
-        });
+        let lost_nmm =
+            of_angle.flat_map(|state| Contact::all().map(|contact| (state, contact))).map(|(state, contact)| {
+                let slip_mm = losses.slip_mm_per_rad.get(contact)[state].abs();
+                coefficient.get(contact) * states.force_n.get(contact)[state] * slip_mm
+            });
         // Two alike zones under 3 N·m.
         let expected = 2.0 * lost_nmm.sum::<f64>() / 3000.0;
         assert_near(loss_ratio, expected, 1e-12 * expected, "loss ratio");
@@ -799,7 +798,7 @@ fn pressure_times_velocity_peak_is_largest_product() {
     let sweep = sweep(&drive, &load, Points::samples(40).unwrap(), &Never).unwrap();
     let losses = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), &Never).unwrap();
     let peaks = losses.pressure_velocity_peaks(&sweep, 50.0);
-    for contact in CONTACTS {
+    for contact in Contact::all() {
         let products = sweep.states.stress_mpa.get(contact).iter().zip(losses.slip_mm_per_rad.get(contact));
         // Both are in mm and are converted to metres.
         let values: Vec<_> = products.map(|(stress_mpa, slip)| stress_mpa * (slip * 50.0).abs() / 1000.0).collect();
@@ -916,7 +915,7 @@ fn sweep_wear_is_that_of_its_states() {
                 let line_load = PerContact::of(|contact| tooth.force_n.get(contact) / 15.0);
                 let depth = mechanism.wear_mm_per_hour(&friction, &parameters, tooth, slip, &line_load);
                 sum += depth.wave_generator;
-                for contact in CONTACTS {
+                for contact in Contact::all() {
                     expected.get_mut(contact).push(*depth.get(contact));
                 }
             }
@@ -930,7 +929,7 @@ fn sweep_wear_is_that_of_its_states() {
             None => assert!(friction.bearing().is_none()),
         }
         let peaks = wear.peaks(&sweep.states);
-        for contact in CONTACTS {
+        for contact in Contact::all() {
             let (found, expected) = (wear.mm_per_hour.get(contact), expected.get(contact));
             assert_eq!(found.len(), expected.len());
             let most = expected.iter().copied().fold(0.0, f64::max);
@@ -993,7 +992,7 @@ fn ball_wears_groove_by_pressure_over_its_middle() {
                 ellipse.stress_mpa(force_n) * half_mm * across * step
             });
             let expected = mechanism.wear_mm_per_hour(&friction, &parameters, tooth, slip, &line_load);
-            for contact in CONTACTS {
+            for contact in Contact::all() {
                 let found = wear.mm_per_hour.get(contact)[state];
                 assert_near(found, *expected.get(contact), 1e-9 * expected.get(contact).max(1e-12), "ball");
             }
@@ -1106,7 +1105,7 @@ fn capacity_is_least_over_contacts() {
         };
         let allowable = PerContact { wave_generator: 1200.0, ring: 900.0, carrier: 400.0 };
         // Each contact alone, with the others unlimited.
-        let alone = CONTACTS.map(|contact| {
+        let alone = Contact::all().map(|contact| {
             let mut limits = everywhere(1e6);
             *limits.get_mut(contact) = *allowable.get(contact);
             let capacity = capacity(limits);
@@ -1116,6 +1115,6 @@ fn capacity_is_least_over_contacts() {
         let least = alone.iter().copied().fold(f64::INFINITY, f64::min);
         let all = capacity(allowable);
         assert_eq!(all.input_torque_nm, least);
-        assert_eq!(alone[CONTACTS.iter().position(|&contact| all.limited_by == contact.into()).unwrap()], least);
+        assert_eq!(alone[Contact::all().iter().position(|&contact| all.limited_by == contact.into()).unwrap()], least);
     }
 }

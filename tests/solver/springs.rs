@@ -30,7 +30,7 @@ fn forces_balance_any_torque_to_1e_12() {
         for law in laws() {
             for exponent in [-12, -9, -6, -3, 0, 3, 6, 9, 12, 15] {
                 for gap_um in [0.0, 1e-6, 1e-3, 1.0, 1e3, 1e6] {
-                    for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
+                    for contact in Contact::all() {
                         let clearance_um = PerContact::of(|at| if at == contact { gap_um } else { 0.0 });
                         let torque = Torque::Input(10.0_f64.powi(exponent));
                         let parameters = LoadParameters { torque, law, clearance_um, ..load(1.0, VirtualWork) };

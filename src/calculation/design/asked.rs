@@ -3,31 +3,29 @@
 use serde::{Deserialize, Serialize};
 use toothwave_solver::backing::Rim;
 use toothwave_solver::fingers::Fingers;
+use toothwave_solver::profile::{Extent, ProfileParameters};
 use utoipa::ToSchema;
 
-use super::number::{Whole, given};
+use super::number::Whole;
 use super::strength::StrengthDocument;
-use crate::key::{Encode, Encoder, encoded};
 
 /// The input angles of a sweep.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct SweepDocument {
     /// Number of equal intervals of one period; both ends are included. Default: 50, if `tolerance` is not given
     /// either.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = i64, minimum = 1, maximum = 10000000, default = 50, required = false)]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = i64, default = 50, required = false)]
     pub samples: Option<Whole>,
     /// Relative tolerance of the extremes of every force and stress, of wind-up, torsional stiffness and torque
     /// capacity. Use it instead of `samples`. Positions and half-widths are accurate to its square root, the
     /// transmission error to the tolerance times the wind-up. Input angles are placed where they are needed. The angle
     /// at which a tooth enters is listed twice, without and with that tooth.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-12, maximum = 0.1, nullable = false)]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub tolerance: Option<f64>,
     /// True if the answer includes wind-up, torsional stiffness and backlash. Default: false.
-    #[serde(default)]
-    #[schema(default = false)]
     pub wind_up: bool,
 }
 
@@ -39,15 +37,15 @@ pub(super) const DEFAULT_SAMPLES: Whole = Whole(50.0);
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct ProfileDocument {
     /// Largest distance of a chord from its curve, in mm. Default: 0.001 mm.
-    #[schema(minimum = 1e-6, maximum = 1e6, default = 0.001)]
     pub chord_tolerance_mm: f64,
     /// Part of the ring to draw: one tooth or the full ring. Default: one tooth.
-    pub extent: ExtentDocument,
+    pub extent: Extent,
 }
 
 impl Default for ProfileDocument {
     fn default() -> Self {
-        Self { chord_tolerance_mm: 1e-3, extent: ExtentDocument::default() }
+        let ProfileParameters { chord_tolerance_mm, extent, .. } = ProfileParameters::default();
+        Self { chord_tolerance_mm, extent }
     }
 }
 
@@ -56,7 +54,6 @@ impl Default for ProfileDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct AccuracyDocument {
     /// Relative error of the peaks that the recommended settings must meet. Default: 1e-6.
-    #[schema(minimum = 1e-12, maximum = 1.0, default = 1e-6)]
     pub requested_error: f64,
 }
 
@@ -64,17 +61,6 @@ impl Default for AccuracyDocument {
     fn default() -> Self {
         Self { requested_error: 1e-6 }
     }
-}
-
-/// Part of the ring to draw.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ExtentDocument {
-    /// From one tooth's symmetry line to the next, so that copies join.
-    #[default]
-    Tooth,
-    /// The closed ring, its last point equal to its first.
-    Full,
 }
 
 /// The parts as manufactured. A part's clearance offsets its working surface into the part along the surface's normal.
@@ -98,11 +84,21 @@ impl PartsDocument {
         self.ring.rim.take_if(|rim| *rim == Rim::Housed);
     }
 
-    /// Returns the data of the parts on which a load's answer depends: gaps, and the supports of the contacts.
-    pub(crate) fn under_load(&self) -> impl Encode + '_ {
-        let Self { wave_generator, teeth, ring, carrier } = self;
-        let CarrierPartDocument { fingers, finger_fillet_radius_mm, strength, .. } = carrier;
-        (wave_generator, teeth, ring, ring.rim, carrier, (fingers, finger_fillet_radius_mm, strength))
+    /// Returns what a drawing reads: no supports, no strength.
+    pub(super) fn as_drawn(&self) -> Self {
+        let mut parts = self.clone();
+        parts.ring.rim = None;
+        let CarrierPartDocument { inner_radius_mm, outer_radius_mm, clearance_um, .. } = parts.carrier;
+        parts.carrier =
+            CarrierPartDocument { inner_radius_mm, outer_radius_mm, clearance_um, ..CarrierPartDocument::default() };
+        parts
+    }
+
+    /// Returns the parts for keys. The name of a strength and its numbers give the same answers.
+    pub(crate) fn under_load(&self) -> Self {
+        let mut parts = self.clone();
+        parts.carrier.strength = self.carrier.strength.map(|strength| StrengthDocument::Given(strength.numbers()));
+        parts
     }
 }
 
@@ -112,11 +108,10 @@ impl PartsDocument {
 pub struct WaveGeneratorPartDocument {
     /// Radius of its bore, in mm. Null or left out: no bore.
     #[serde(default)]
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub bore_radius_mm: Option<f64>,
     /// Inward offset of the cam, in µm. Default: 0 µm.
     #[serde(default)]
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
+    #[schema(default = 0.0)]
     pub clearance_um: f64,
 }
 
@@ -125,61 +120,56 @@ pub struct WaveGeneratorPartDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct ToothPartDocument {
     /// Reduction of their radius from `drive.teeth.radius_mm`, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
 }
 
 /// The ring as manufactured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct RingPartDocument {
     /// Outer radius, in mm. Default: 1.2 times the largest radius of the tooth spaces. This is the root radius, unless
     /// a tip relief extends beyond it.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub outer_radius_mm: Option<f64>,
     /// Outward offset of the flank, in µm. A bored tip keeps its radius. Default: 0 µm.
-    #[serde(default)]
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
     /// Support of the ring's rim. A sweep estimates the compliance from it; drawings do not use it. Default: a rigid
     /// housing, assumed by the findings.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub rim: Option<Rim>,
 }
 
 /// The carrier as manufactured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct CarrierPartDocument {
     /// Inner radius, in mm. Default: one tenth of the annulus between cam and ring tips stays free inside. Slot walls
     /// support flat-sided teeth from this radius on.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub inner_radius_mm: Option<f64>,
     /// Outer radius, in mm. Default: one tenth of that annulus stays free outside. Slot walls support flat-sided teeth
     /// up to this radius.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub outer_radius_mm: Option<f64>,
     /// Offset of each wall of a slot, in µm. Default: 0 µm.
-    #[serde(default)]
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
     pub clearance_um: f64,
     /// Support of the fingers between the slots. A sweep calculates compliance and strength from it. If they are held at
     /// one end or in the middle, contact stresses are those at the place where the load along a tooth is largest.
     /// Left out: the compliance is that of fingers held at both ends, the strength that of joined far ends, and the load along a tooth is even.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub fingers: Option<Fingers>,
     /// Radius of the fillet at the foot of a finger, in mm. Default: a tenth of the finger's thickness.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub finger_fillet_radius_mm: Option<f64>,
     /// Strength of the carrier's material: a name from `GET /v1/materials`, or numbers. With it a sweep calculates the
     /// safety of the fingers, which also limits the torque capacity. Default: no safety.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub strength: Option<StrengthDocument>,
 }
@@ -190,36 +180,5 @@ pub struct CarrierPartDocument {
 pub struct AssemblyDocument {
     /// Angle of the wave generator from the start position, in deg. At the start the middle of a lobe
     /// (the major axis of an ellipse) and tooth 0 are in the middle of a tooth space. Default: 0 deg.
-    #[schema(minimum = -1e7, maximum = 1e7, default = 0.0)]
     pub input_angle_deg: f64,
-}
-
-encoded! {
-    struct SweepDocument { samples, tolerance, wind_up }
-    struct ProfileDocument { chord_tolerance_mm, extent }
-    struct AccuracyDocument { requested_error }
-    struct PartsDocument { wave_generator, teeth, ring, carrier }
-    struct WaveGeneratorPartDocument { bore_radius_mm, clearance_um }
-    struct ToothPartDocument { clearance_um }
-    struct AssemblyDocument { input_angle_deg }
-}
-
-encoded!(enum ExtentDocument);
-encoded!(enum Rim);
-encoded!(enum Fingers);
-
-/// Without the support of the part, which drawings do not use. Keys that need it add it.
-impl Encode for RingPartDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Self { outer_radius_mm, clearance_um, rim: _ } = self;
-        (outer_radius_mm, clearance_um).encode(encoder);
-    }
-}
-
-/// Without the support of the part, as above.
-impl Encode for CarrierPartDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Self { inner_radius_mm, outer_radius_mm, clearance_um, .. } = self;
-        (inner_radius_mm, outer_radius_mm, clearance_um).encode(encoder);
-    }
 }

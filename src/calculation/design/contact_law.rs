@@ -1,12 +1,10 @@
-//! The contact law. A law is a structure of its fields, a line of the union, an arm of each match and a line of
-//! `encoded!`.
+//! The contact law. A law is a structure of its fields, a line of the union and an arm of each match.
 
 use serde::{Deserialize, Serialize};
 use toothwave_solver::{ContactLaw, PerContact};
 use utoipa::ToSchema;
 
 use super::drive::LengthsByContactDocument;
-use crate::key::encoded;
 use crate::union::union;
 
 union! {
@@ -35,13 +33,10 @@ pub struct LinearDocument {}
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct FixedDocument {
     /// Stiffness at the wave generator, in N/mm.
-    #[schema(minimum = 1e-3, maximum = 1e15)]
     pub wave_generator_n_per_mm: f64,
     /// Stiffness at the ring, in N/mm.
-    #[schema(minimum = 1e-3, maximum = 1e15)]
     pub ring_n_per_mm: f64,
     /// Stiffness at the carrier, in N/mm.
-    #[schema(minimum = 1e-3, maximum = 1e15)]
     pub carrier_n_per_mm: f64,
 }
 
@@ -91,12 +86,4 @@ impl StiffnessDocument {
             }
         }
     }
-}
-
-encoded! {
-    struct LinearDocument {}
-    struct FixedDocument { wave_generator_n_per_mm, ring_n_per_mm, carrier_n_per_mm }
-    struct PalmgrenDocument {}
-    struct JohnsonDocument { depth_mm }
-    struct HertzDocument {}
 }

@@ -5,8 +5,6 @@ use toothwave_solver::gaps::{Deviations, Runout};
 use toothwave_solver::{DriveParameters, PerContact};
 use utoipa::ToSchema;
 
-use crate::key::encoded;
-
 /// Deviations of individual items of the parts, measured or random, with `virtual_work` only. A positive value opens a
 /// gap. A positive angle is a rotation away from the flank under load. A list has one entry for each item, counted from
 /// 0, or is empty if no item deviates.
@@ -14,41 +12,23 @@ use crate::key::encoded;
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct DeviationsDocument {
     /// Reduction of the teeth's radius, by slot, in µm.
-    #[schema(minimum = -1e6, maximum = 1e6)]
     pub tooth_radius_um: Vec<f64>,
     /// Rotation of the slots about the axis, by slot, in arcsec.
-    #[schema(minimum = -1e5, maximum = 1e5)]
     pub slot_angle_arcsec: Vec<f64>,
     /// Offset of the slots' walls, by slot, in µm.
-    #[schema(minimum = -1e6, maximum = 1e6)]
     pub slot_wall_um: Vec<f64>,
     /// Offset of the profiles along their normals, by ring space, in µm.
-    #[schema(minimum = -1e6, maximum = 1e6)]
     pub ring_space_um: Vec<f64>,
     /// Rotation of the ring's spaces about the axis, by ring space, in arcsec.
-    #[schema(minimum = -1e5, maximum = 1e5)]
     pub ring_space_angle_arcsec: Vec<f64>,
     /// Offset of the wave generator along its normals, by lobe, in µm.
-    #[schema(minimum = -1e6, maximum = 1e6)]
     pub wave_generator_lobe_um: Vec<f64>,
     /// Runout of the wave generator. Its angle is counted from the middle of lobe 0.
-    pub wave_generator_runout: RunoutDocument,
+    pub wave_generator_runout: Runout,
     /// Runout of the ring. Its angle is counted from the middle of space 0.
-    pub ring_runout: RunoutDocument,
+    pub ring_runout: Runout,
     /// Runout of the carrier. Its angle is counted from slot 0.
-    pub carrier_runout: RunoutDocument,
-}
-
-/// Runout: distance of a part's centre from the axis, in a direction that is fixed in the part.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default, expecting = "an object")]
-pub struct RunoutDocument {
-    /// Distance from the axis, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0)]
-    pub amount_um: f64,
-    /// Direction, in deg. Default: 0 deg.
-    #[schema(minimum = -360.0, maximum = 360.0, default = 0.0)]
-    pub angle_deg: f64,
+    pub carrier_runout: Runout,
 }
 
 impl DeviationsDocument {
@@ -80,31 +60,10 @@ impl From<&DeviationsDocument> for Deviations {
             ring_space_angle_arcsec: document.ring_space_angle_arcsec.clone(),
             wave_generator_lobe_um: document.wave_generator_lobe_um.clone(),
             runout: PerContact {
-                wave_generator: (&document.wave_generator_runout).into(),
-                ring: (&document.ring_runout).into(),
-                carrier: (&document.carrier_runout).into(),
+                wave_generator: document.wave_generator_runout,
+                ring: document.ring_runout,
+                carrier: document.carrier_runout,
             },
         }
     }
-}
-
-impl From<&RunoutDocument> for Runout {
-    fn from(&RunoutDocument { amount_um, angle_deg }: &RunoutDocument) -> Self {
-        Self { amount_um, angle_deg }
-    }
-}
-
-encoded! {
-    struct DeviationsDocument {
-        tooth_radius_um,
-        slot_angle_arcsec,
-        slot_wall_um,
-        ring_space_um,
-        ring_space_angle_arcsec,
-        wave_generator_lobe_um,
-        wave_generator_runout,
-        ring_runout,
-        carrier_runout,
-    }
-    struct RunoutDocument { amount_um, angle_deg }
 }

@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 use toothwave_solver::{PerContact, ToothShape, WaveGenerator};
 use utoipa::ToSchema;
 
-use super::number::{Whole, given};
-use crate::key::{Encode, Encoder, encoded};
+use super::number::Whole;
 use crate::union::union;
 
 /// Wave generator, teeth and ring.
@@ -39,10 +38,8 @@ union! {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct EllipseDocument {
     /// Semi-major axis a, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub semi_major_mm: f64,
     /// Semi-minor axis b, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub semi_minor_mm: f64,
 }
 
@@ -51,10 +48,8 @@ pub struct EllipseDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct EccentricDocument {
     /// Radius R0 of the circle, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub radius_mm: f64,
     /// Distance e of its centre from the axis, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub eccentricity_mm: f64,
 }
 
@@ -63,13 +58,11 @@ pub struct EccentricDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct HarmonicDocument {
     /// Lobes U: teeth pass as many meshing zones in a turn. With one the cam is an `eccentric`.
-    #[schema(value_type = i64, minimum = 2, maximum = 1000)]
+    #[schema(value_type = i64, minimum = 2)]
     pub lobes: Whole,
     /// Mean radius R0, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub mean_radius_mm: f64,
     /// Amplitude e, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub amplitude_mm: f64,
 }
 
@@ -78,13 +71,11 @@ pub struct HarmonicDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct HarmonicPathDocument {
     /// Number of lobes U, and of meshing zones.
-    #[schema(value_type = i64, minimum = 1, maximum = 1000)]
+    #[schema(value_type = i64)]
     pub lobes: Whole,
     /// Mean radius R of the path, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub mean_path_radius_mm: f64,
     /// Amplitude e, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub amplitude_mm: f64,
 }
 
@@ -105,17 +96,15 @@ union! {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct CylinderDocument {
     /// Theoretical number of teeth Z_G. It differs from the ring's by the number of lobes of the wave generator.
-    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    #[schema(value_type = i64)]
     pub count: Whole,
     /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = i64, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a tooth, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub radius_mm: f64,
     /// Width L1 of a tooth along the axis, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub width_mm: f64,
 }
 
@@ -124,14 +113,13 @@ pub struct CylinderDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct BallDocument {
     /// Theoretical number of teeth Z_G. It differs from the ring's by the number of lobes of the wave generator.
-    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    #[schema(value_type = i64)]
     pub count: Whole,
     /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = i64, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a ball, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub radius_mm: f64,
     /// Radii of the grooves across the path, in mm, each larger than the ball's radius. Default: no groove; the part is
     /// straight along the axis.
@@ -144,38 +132,35 @@ pub struct BallDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct FlatSidedDocument {
     /// Theoretical number of teeth Z_G. It differs from the ring's by the number of lobes of the wave generator.
-    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    #[schema(value_type = i64)]
     pub count: Whole,
     /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = i64, minimum = 2, maximum = 10000, required = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = i64, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a tooth, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub radius_mm: f64,
     /// Width L1 of a tooth along the axis, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub width_mm: f64,
     /// Length l of a flat along the slot, in mm. It must be below the tooth's diameter.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub flat_length_mm: f64,
 }
 
 /// Length for each contact, in mm; each can be left out.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
+#[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct LengthsByContactDocument {
     /// At the wave generator, in mm.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub wave_generator: Option<f64>,
     /// At the ring, in mm.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub ring: Option<f64>,
     /// At the carrier, in mm.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub carrier: Option<f64>,
 }
 
@@ -265,45 +250,9 @@ impl TeethDocument {
 pub struct RingDocument {
     /// Number of teeth Z_K. It differs from the teeth's `count` by the number of lobes of the wave generator, two for
     /// an ellipse.
-    #[schema(value_type = i64, minimum = 2, maximum = 10000)]
+    #[schema(value_type = i64)]
     pub teeth: Whole,
     /// Radius of a bore that truncates the teeth, in mm. Null or left out: the ring keeps its natural tip.
     #[serde(default)]
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub tip_radius_mm: Option<f64>,
-}
-
-encoded! {
-    struct DriveDocument { wave_generator, teeth, ring }
-    struct EllipseDocument { semi_major_mm, semi_minor_mm }
-    struct EccentricDocument { radius_mm, eccentricity_mm }
-    struct HarmonicDocument { lobes, mean_radius_mm, amplitude_mm }
-    struct HarmonicPathDocument { lobes, mean_path_radius_mm, amplitude_mm }
-    struct LengthsByContactDocument { wave_generator, ring, carrier }
-    struct RingDocument { teeth, tip_radius_mm }
-}
-
-/// With the default of `installed`. The document keeps the field empty, so that no error refers to a field that is left
-/// out.
-impl Encode for CylinderDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Self { count, installed, radius_mm, width_mm } = self;
-        (count, installed.unwrap_or(*count), radius_mm, width_mm).encode(encoder);
-    }
-}
-
-/// With the default of `installed`, as for cylinders.
-impl Encode for BallDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Self { count, installed, radius_mm, groove_radius_mm } = self;
-        (count, installed.unwrap_or(*count), radius_mm, groove_radius_mm).encode(encoder);
-    }
-}
-
-/// With the default of `installed`, as for cylinders.
-impl Encode for FlatSidedDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Self { count, installed, radius_mm, width_mm, flat_length_mm } = self;
-        (count, installed.unwrap_or(*count), radius_mm, width_mm, flat_length_mm).encode(encoder);
-    }
 }

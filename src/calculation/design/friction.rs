@@ -7,8 +7,6 @@ use toothwave_solver::losses::{Friction, FrictionParameters, RaceBearing, WaveGe
 use toothwave_solver::{Contact, Parameter, PerContact, Violation};
 use utoipa::ToSchema;
 
-use super::number::given;
-use crate::key::encoded;
 use crate::union::union;
 
 /// Coulomb friction at each contact.
@@ -22,7 +20,7 @@ pub struct FrictionDocument {
     /// Friction between teeth and carrier.
     pub carrier: CoefficientDocument,
     /// Wear rates of the parts for Archard's law, in mm³/(N·m). If all are 0, as by default, wear is not calculated.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub wear_rate_mm3_per_nm: Option<WearRatesDocument>,
 }
@@ -32,13 +30,10 @@ pub struct FrictionDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct WearRatesDocument {
     /// At the wave generator or its race, in mm³/(N·m). Default: 0.
-    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub wave_generator: f64,
     /// At the ring, in mm³/(N·m). Default: 0.
-    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub ring: f64,
     /// At the carrier, in mm³/(N·m). Default: 0.
-    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub carrier: f64,
 }
 
@@ -47,7 +42,6 @@ pub struct WearRatesDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct CoefficientDocument {
     /// Coefficient of friction μ, from 0 to 1.
-    #[schema(minimum = 0.0, maximum = 1.0)]
     pub coefficient: f64,
 }
 
@@ -69,18 +63,15 @@ union! {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RaceDocument {
     /// Coefficient of friction μ between teeth and race, from 0 to 1.
-    #[schema(minimum = 0.0, maximum = 1.0)]
     pub coefficient: f64,
     /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
-    #[schema(minimum = 0.0, maximum = 1.0)]
     pub bearing_coefficient: f64,
     /// Radius R_b for the bearing's coefficient of friction, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub bearing_radius_mm: f64,
     /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
     /// circle. Default: no life is calculated.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-3, maximum = 1e12, nullable = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub bearing_load_rating_n: Option<f64>,
     /// Rolling element of the bearing. Default: ball.
     #[serde(default)]
@@ -92,19 +83,17 @@ pub struct RaceDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RollingDocument {
     /// Allowed as for `race`, but without effect: such a race does not slide on the teeth.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 0.0, maximum = 1.0, nullable = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub coefficient: Option<f64>,
     /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
-    #[schema(minimum = 0.0, maximum = 1.0)]
     pub bearing_coefficient: f64,
     /// Radius R_b for the bearing's coefficient of friction, in mm.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub bearing_radius_mm: f64,
     /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
     /// circle. Default: no life is calculated.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-3, maximum = 1e12, nullable = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub bearing_load_rating_n: Option<f64>,
     /// Rolling element of the bearing. Default: ball.
     #[serde(default)]
@@ -198,13 +187,3 @@ impl From<&FrictionDocument> for FrictionParameters {
         }
     }
 }
-
-encoded! {
-    struct FrictionDocument { wave_generator, ring, carrier, wear_rate_mm3_per_nm }
-    struct CoefficientDocument { coefficient }
-    struct WearRatesDocument { wave_generator, ring, carrier }
-    struct RaceDocument { coefficient, bearing_coefficient, bearing_radius_mm, bearing_load_rating_n, bearing_element }
-    struct RollingDocument { coefficient, bearing_coefficient, bearing_radius_mm, bearing_load_rating_n, bearing_element }
-}
-
-encoded!(enum RollingElement);

@@ -1,52 +1,15 @@
-//! Materials and load.
+//! Load.
 
 use std::borrow::Cow;
 
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use toothwave_solver::PerContact;
 use toothwave_solver::fingers::LoadCycle;
-use toothwave_solver::violation::Range;
-use toothwave_solver::{Material, Parameter, PerContact};
 use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
-
-use super::number::given;
-use crate::key::{Encode, Encoder, encoded};
-
-/// Materials by part.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default, expecting = "an object")]
-pub struct MaterialsDocument {
-    /// Material of the wave generator. Default: steel.
-    pub wave_generator: MaterialDocument,
-    /// Material of the teeth. Default: steel.
-    pub teeth: MaterialDocument,
-    /// Material of the ring. Default: steel.
-    pub ring: MaterialDocument,
-    /// Material of the carrier. Default: steel.
-    pub carrier: MaterialDocument,
-}
-
-/// An isotropic elastic material.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default, expecting = "an object")]
-pub struct MaterialDocument {
-    /// Young's modulus E, in GPa. Default: 210 GPa.
-    #[schema(minimum = 1e-3, maximum = 1e5, default = 210.0)]
-    pub youngs_modulus_gpa: f64,
-    /// Poisson's ratio ν. Default: 0.3.
-    #[schema(exclusive_minimum = -1.0, exclusive_maximum = 0.5, default = 0.3)]
-    pub poissons_ratio: f64,
-}
-
-impl Default for MaterialDocument {
-    fn default() -> Self {
-        let Material { youngs_modulus_gpa, poissons_ratio } = Material::STEEL;
-        Self { youngs_modulus_gpa, poissons_ratio }
-    }
-}
 
 /// Load and allowable stress. The load is exactly one of: torque at the wave generator, torque at the carrier, or duty;
 /// ring fixed.
@@ -54,29 +17,29 @@ impl Default for MaterialDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct LoadDocument {
     /// Torque M0 at the wave generator, in N·m.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub input_torque_nm: Option<f64>,
     /// Torque at the carrier, in N·m, without losses.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub output_torque_nm: Option<f64>,
     /// Allowable contact stress, in MPa, for the torque capacity. A finding reports if it is exceeded. Default: no
     /// torque capacity.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub allowable_stress_mpa: Option<AllowableStressDocument>,
     /// Speed of the wave generator, in 1/min. With `friction` it gives powers and sliding speeds. The points of a duty
     /// have their own speeds.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6, nullable = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub input_speed_rpm: Option<f64>,
     /// Course of the load on the carrier's fingers, for their fatigue. Default: pulsating.
     #[serde(default)]
     pub cycle: LoadCycle,
     /// Load spectrum: one to 100 loads, whose shares of the running time add up to one.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, min_items = 1, max_items = 100)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub duty: Option<Vec<DutyPointDocument>>,
 }
 
@@ -85,18 +48,16 @@ pub struct LoadDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct DutyPointDocument {
     /// Torque M0 at the wave generator, in N·m.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub input_torque_nm: Option<f64>,
     /// Torque at the carrier, in N·m, without losses.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-12, maximum = 1e15, nullable = false)]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub output_torque_nm: Option<f64>,
     /// Speed of the wave generator, in 1/min.
-    #[schema(minimum = 1e-6, maximum = 1e6)]
     pub input_speed_rpm: f64,
     /// Share of the running time, from 0 to 1.
-    #[schema(minimum = 1e-9, maximum = 1.0)]
     pub share_of_time: f64,
 }
 
@@ -114,13 +75,10 @@ pub enum AllowableStressDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct StressByContactDocument {
     /// Between teeth and wave generator, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
     pub wave_generator: f64,
     /// Between teeth and ring, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
     pub ring: f64,
     /// Between teeth and carrier, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
     pub carrier: f64,
 }
 
@@ -161,11 +119,9 @@ impl<'de> Deserialize<'de> for AllowableStressDocument {
 
 impl PartialSchema for AllowableStressDocument {
     fn schema() -> RefOr<Schema> {
-        let Range { low, high, .. } = Parameter::AllowableStress.range();
-        let number = ObjectBuilder::new().schema_type(Type::Number).minimum(Some(low)).maximum(Some(high));
         OneOfBuilder::new()
             .description(Some("Allowable contact stress, in MPa: one number for all contacts, or one for each."))
-            .item(number)
+            .item(ObjectBuilder::new().schema_type(Type::Number))
             .item(Ref::from_schema_name(StressByContactDocument::name()))
             .into()
     }
@@ -191,29 +147,3 @@ impl From<AllowableStressDocument> for PerContact<f64> {
         }
     }
 }
-
-/// Encodes the kind too, so that a number and an object never have equal keys.
-impl Encode for AllowableStressDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        match self {
-            Self::Everywhere(stress_mpa) => {
-                encoder.byte(0);
-                stress_mpa.encode(encoder);
-            }
-            Self::ByContact(stresses) => {
-                encoder.byte(1);
-                stresses.encode(encoder);
-            }
-        }
-    }
-}
-
-encoded! {
-    struct MaterialsDocument { wave_generator, teeth, ring, carrier }
-    struct MaterialDocument { youngs_modulus_gpa, poissons_ratio }
-    struct LoadDocument { input_torque_nm, output_torque_nm, allowable_stress_mpa, input_speed_rpm, cycle, duty }
-    struct DutyPointDocument { input_torque_nm, output_torque_nm, input_speed_rpm, share_of_time }
-    struct StressByContactDocument { wave_generator, ring, carrier }
-}
-
-encoded!(enum LoadCycle);

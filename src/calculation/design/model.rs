@@ -11,9 +11,7 @@ use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
 use super::contact_law::StiffnessDocument;
-use super::number::given;
 use super::refinements::RefinementsDocument;
-use crate::key::{Encode, Encoder, encoded};
 
 /// The model of load sharing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -23,7 +21,7 @@ pub struct ModelDocument {
     #[serde(default)]
     pub compatibility: Compatibility,
     /// The contact law; left out, `hertz` of balls, of other teeth `johnson`, and `linear` with `projection`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub stiffness: Option<StiffnessDocument>,
     /// Compliance of the supports, in series with each contact, in mm/N. Needs `virtual_work`. Default: 0 mm/N.
@@ -33,20 +31,20 @@ pub struct ModelDocument {
     #[serde(default)]
     pub refinements: RefinementsDocument,
     /// Use `refinements`. Overrides it for `ring_teeth_bend`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, deprecated)]
     pub ring_teeth_bend: Option<bool>,
     /// Use `refinements`. Overrides it for `wave_generator_moves`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, deprecated)]
     pub wave_generator_moves: Option<bool>,
     /// Use `refinements`. Overrides it for `corner_contact`.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, deprecated)]
     pub corner_contact: Option<bool>,
     /// Use `clearance_um` of the `parts`. A gap at a contact is assigned to the part that the teeth touch there, unless
     /// `parts` already gives the same gap. A gap of 0 µm counts as left out.
-    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, deprecated)]
     pub clearance: Option<ClearanceDocument>,
 }
@@ -56,13 +54,13 @@ pub struct ModelDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct ClearanceDocument {
     /// Gap at the wave generator, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, deprecated)]
+    #[schema(deprecated)]
     pub wave_generator_um: f64,
     /// Gap at the ring, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, deprecated)]
+    #[schema(deprecated)]
     pub ring_um: f64,
     /// Gap at the carrier, in µm. Default: 0 µm.
-    #[schema(minimum = 0.0, maximum = 1e6, default = 0.0, deprecated)]
+    #[schema(deprecated)]
     pub carrier_um: f64,
 }
 
@@ -80,13 +78,10 @@ pub enum SeriesComplianceDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct CompliancesDocument {
     /// At the wave generator, in mm/N. Default: 0 mm/N.
-    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub wave_generator: f64,
     /// At the ring, in mm/N. Default: 0 mm/N.
-    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub ring: f64,
     /// At the carrier, in mm/N. Default: 0 mm/N.
-    #[schema(minimum = 0.0, maximum = 1e3, default = 0.0)]
     pub carrier: f64,
 }
 
@@ -171,23 +166,3 @@ impl ToSchema for SeriesComplianceDocument {
         schemas.push((CompliancesDocument::name().into(), CompliancesDocument::schema()));
     }
 }
-
-impl Encode for SeriesComplianceDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let given = match self {
-            Self::Estimated => None,
-            Self::Given(compliances) => Some(compliances),
-        };
-        given.encode(encoder);
-    }
-}
-
-encoded! {
-    struct ModelDocument {
-        compatibility, stiffness, series_compliance_mm_per_n, refinements, ring_teeth_bend, wave_generator_moves, corner_contact, clearance
-    }
-    struct ClearanceDocument { wave_generator_um, ring_um, carrier_um }
-    struct CompliancesDocument { wave_generator, ring, carrier }
-}
-
-encoded!(enum Compatibility);

@@ -1,8 +1,6 @@
-//! Numbers and optional fields of documents.
+//! Whole numbers of documents.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-use crate::key::{Encode, Encoder};
 
 /// A whole number of any size, written as `28`, `28.0` or `2.8e1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,16 +41,5 @@ impl<'de> Deserialize<'de> for Whole {
             let message = format_args!("a whole number is wanted here, not {value}").to_string();
             Err(serde::de::Error::custom(message))
         }
-    }
-}
-
-/// Deserializes a field that may be left out but not be null.
-pub(super) fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
-    T::deserialize(deserializer).map(Some)
-}
-
-impl Encode for Whole {
-    fn encode(&self, encoder: &mut Encoder) {
-        self.0.encode(encoder);
     }
 }

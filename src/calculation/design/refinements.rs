@@ -9,7 +9,6 @@ use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
 use crate::json::ANY;
-use crate::key::encoded;
 
 /// A set of refinements. Needs `virtual_work`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -173,9 +172,4 @@ impl ToSchema for RefinementsDocument {
     fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
         schemas.push((RefinementItem::name().into(), RefinementItem::schema()));
     }
-}
-
-encoded! {
-    struct RefinementsDocument { auto, listed }
-    struct Refinements { ring_teeth_bend, wave_generator_moves, corner_contact }
 }

@@ -1,16 +1,16 @@
 //! Resolution of a document: defaults of fields that are left out, and deprecated fields.
 
+use serde::Serialize;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::violation::Modified;
-use toothwave_solver::{Compatibility, Deviations, Modification, Parameter, Part, PerContact, Violation, model_error};
+use toothwave_solver::{Compatibility, Deviations, LoadCase, Parameter, Part, PerContact, Violation, model_error};
 
 use super::{
-    ClearanceDocument, Design, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument, Refinements,
-    RefinementsDocument, StiffnessDocument, TeethDocument,
+    ClearanceDocument, Design, DriveDocument, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
+    Refinements, RefinementsDocument, StiffnessDocument, TeethDocument,
 };
 use crate::field::{FieldCode, contact_name, pointer};
 use crate::json::Fault;
-use crate::key::Encode;
 
 /// Clearance of each part: offset of its working surface.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -118,7 +118,7 @@ impl Design {
 
     /// Returns the surfaces that are offset by two fields.
     pub fn set_back_twice(&self) -> impl Iterator<Item = SetBackTwice> + use<> {
-        let (clearances, modification) = (self.clearances_um(), Modification::from(&self.modification));
+        let (clearances, modification) = (self.clearances_um(), self.modification);
         let PerContact { wave_generator, ring, carrier } = clearances.by_contact;
         let pairs = [
             (
@@ -196,7 +196,7 @@ impl Design {
     /// Returns true if any contact has a gap.
     fn has_gaps(&self) -> bool {
         self.clearances_um().gaps() != PerContact::default()
-            || !Modification::from(&self.modification).is_nil()
+            || !self.modification.is_nil()
             || !Deviations::from(&self.deviations).is_nil()
     }
 
@@ -285,8 +285,18 @@ impl Design {
         self
     }
 
-    pub(crate) fn parts_in_key(&self) -> impl Encode + '_ {
-        (&self.parts, self.clearance_in_key())
+    /// Returns the drive for keys. The document keeps a left-out `installed`, so that no error refers to it.
+    pub(crate) fn drive_in_key(&self) -> DriveDocument {
+        let mut drive = self.drive.clone();
+        drive.teeth.install_all_by_default();
+        drive
+    }
+
+    /// Returns what a drawing reads, for keys.
+    pub(crate) fn drawn_in_key(&self) -> impl Serialize + '_ {
+        let chord_tolerance_mm = self.profile.chord_tolerance_mm;
+        let parts = (self.parts.as_drawn(), self.clearance_in_key());
+        (self.drive_in_key(), parts, &self.modification, chord_tolerance_mm)
     }
 
     /// Returns `model.clearance` if it has an effect.

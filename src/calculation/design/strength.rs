@@ -11,66 +11,39 @@ use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
-use crate::key::{Encode, Encoder};
 use crate::strengths::{STRENGTHS, StrengthPreset};
 
 /// Strength of the carrier's material: a name from `GET /v1/materials`, or numbers.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StrengthDocument {
     /// A material by name.
     Named(&'static StrengthPreset),
     /// Numbers.
-    Given(StrengthNumbersDocument),
-}
-
-/// Strength of a material, in MPa.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
-pub struct StrengthNumbersDocument {
-    /// Yield strength R_p0.2, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
-    pub yield_strength_mpa: f64,
-    /// Tensile strength R_m, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
-    pub tensile_strength_mpa: f64,
-    /// Endurance limit σ_W under reversed load, without a notch, in MPa.
-    #[schema(minimum = 1e-3, maximum = 1e6)]
-    pub endurance_limit_mpa: f64,
-    /// True if the material breaks at a notch before it yields there, as hardened steel does. Default: false.
-    #[serde(default)]
-    #[schema(default = false)]
-    pub hardened: bool,
+    Given(Strength),
 }
 
 impl StrengthDocument {
-    /// Returns the given numbers.
-    pub(super) fn numbers(&self) -> impl Iterator<Item = (Parameter, f64)> + use<> {
-        let numbers = match self {
-            Self::Named(_) => None,
-            Self::Given(numbers) => Some([
-                (Parameter::YieldStrength, numbers.yield_strength_mpa),
-                (Parameter::TensileStrength, numbers.tensile_strength_mpa),
-                (Parameter::EnduranceLimit, numbers.endurance_limit_mpa),
-            ]),
-        };
-        numbers.into_iter().flatten()
+    /// Returns the numbers.
+    pub(super) const fn numbers(self) -> Strength {
+        match self {
+            Self::Named(preset) => Strength {
+                yield_mpa: preset.yield_strength_mpa,
+                tensile_mpa: preset.tensile_strength_mpa,
+                endurance_mpa: preset.endurance_limit_mpa,
+                is_hardened: preset.hardened,
+            },
+            Self::Given(strength) => strength,
+        }
     }
-}
 
-impl From<&StrengthDocument> for Strength {
-    fn from(document: &StrengthDocument) -> Self {
-        let (yield_mpa, tensile_mpa, endurance_mpa, is_hardened) = match document {
-            StrengthDocument::Named(preset) => {
-                (preset.yield_strength_mpa, preset.tensile_strength_mpa, preset.endurance_limit_mpa, preset.hardened)
-            }
-            StrengthDocument::Given(numbers) => (
-                numbers.yield_strength_mpa,
-                numbers.tensile_strength_mpa,
-                numbers.endurance_limit_mpa,
-                numbers.hardened,
-            ),
-        };
-        Self { yield_mpa, tensile_mpa, endurance_mpa, is_hardened }
+    /// Returns the numbers with their parameters.
+    pub(super) const fn parameters(&self) -> [(Parameter, f64); 3] {
+        let Strength { yield_mpa, tensile_mpa, endurance_mpa, .. } = self.numbers();
+        [
+            (Parameter::YieldStrength, yield_mpa),
+            (Parameter::TensileStrength, tensile_mpa),
+            (Parameter::EnduranceLimit, endurance_mpa),
+        ]
     }
 }
 
@@ -114,7 +87,7 @@ impl<'de> Deserialize<'de> for StrengthDocument {
 
             fn visit_map<A: MapAccess<'de>>(self, fields: A) -> Result<Self::Value, A::Error> {
                 let deserializer = MapAccessDeserializer::new(fields);
-                StrengthNumbersDocument::deserialize(deserializer).map(StrengthDocument::Given)
+                Strength::deserialize(deserializer).map(StrengthDocument::Given)
             }
         }
 
@@ -127,7 +100,7 @@ impl PartialSchema for StrengthDocument {
         OneOfBuilder::new()
             .description(Some("Strength of the carrier's material: a name from `GET /v1/materials`, or numbers."))
             .item(ObjectBuilder::new().schema_type(Type::String).enum_values(Some(NAMES)))
-            .item(Ref::from_schema_name(StrengthNumbersDocument::name()))
+            .item(Ref::from_schema_name(Strength::name()))
             .into()
     }
 }
@@ -138,14 +111,6 @@ impl ToSchema for StrengthDocument {
     }
 
     fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        schemas.push((StrengthNumbersDocument::name().into(), StrengthNumbersDocument::schema()));
-    }
-}
-
-/// A name and its numbers give the same answers.
-impl Encode for StrengthDocument {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Strength { yield_mpa, tensile_mpa, endurance_mpa, is_hardened } = self.into();
-        (yield_mpa, tensile_mpa, endurance_mpa, is_hardened).encode(encoder);
+        schemas.push((Strength::name().into(), Strength::schema()));
     }
 }

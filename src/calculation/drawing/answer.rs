@@ -66,7 +66,7 @@ pub struct DrawingAnswer {
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct BodyAnswer {
     /// Name of the part.
-    pub part: BodyPart,
+    pub part: Part,
     /// Shape of the solid on its section.
     pub solid: BodySolid,
     /// Height of the prism. For a ball, that of the parts around it, with the ball in the middle.
@@ -87,31 +87,6 @@ pub enum BodySolid {
     Prism,
     /// A ball of the section's radius. Its centre is half the width above the section.
     Ball,
-}
-
-/// A part of the drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum BodyPart {
-    /// The elliptic cam.
-    WaveGenerator,
-    /// The discrete teeth.
-    Teeth,
-    /// The rigid internal wheel.
-    Ring,
-    /// The slotted annulus: its fingers, without the discs that join them.
-    Carrier,
-}
-
-impl From<Part> for BodyPart {
-    fn from(part: Part) -> Self {
-        match part {
-            Part::WaveGenerator => Self::WaveGenerator,
-            Part::Teeth => Self::Teeth,
-            Part::Ring => Self::Ring,
-            Part::Carrier => Self::Carrier,
-        }
-    }
 }
 
 /// Closed path. Each edge starts exactly at the end point of the edge before, the first at that of the last. Edges are
@@ -288,10 +263,10 @@ impl From<Placement> for PlacementAnswer {
 }
 
 impl BodyAnswer {
-    pub(super) fn new(Body { part, section, placements }: Body, drive: &Drive) -> Self {
+    pub(super) fn new(Body { part, section, placements, .. }: Body, drive: &Drive) -> Self {
         let is_ball = part == Part::Teeth && matches!(drive.parameters().tooth, ToothShape::Ball { .. });
         Self {
-            part: part.into(),
+            part,
             solid: if is_ball { BodySolid::Ball } else { BodySolid::Prism },
             width_mm: drive.tooth_width_mm(),
             outer: section.outer.into(),

@@ -6,7 +6,9 @@
 
 use std::io::{self, Write};
 
-use super::answer::{BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use toothwave_solver::Part;
+
+use super::answer::{DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
 use super::svg;
 
 /// Application name under which every outline stores its part, as extended data.
@@ -30,12 +32,12 @@ const VIEW_MARGIN: f64 = 0.1;
 /// Name of a layer and its colour in the AutoCAD index.
 struct Layer(&'static str, u8);
 
-const fn layer_of(part: BodyPart) -> Layer {
+const fn layer_of(part: Part) -> Layer {
     match part {
-        BodyPart::WaveGenerator => Layer("WAVE_GENERATOR", 6),
-        BodyPart::Teeth => Layer("TEETH", 2),
-        BodyPart::Ring => Layer("RING", 5),
-        BodyPart::Carrier => Layer("CARRIER", 3),
+        Part::WaveGenerator => Layer("WAVE_GENERATOR", 6),
+        Part::Teeth => Layer("TEETH", 2),
+        Part::Ring => Layer("RING", 5),
+        Part::Carrier => Layer("CARRIER", 3),
     }
 }
 

@@ -7,7 +7,9 @@
 
 use std::f64::consts::PI;
 
-use super::answer::{BodyAnswer, BodyPart, BodySolid, DrawingAnswer, EdgeAnswer, OutlineAnswer};
+use toothwave_solver::Part;
+
+use super::answer::{BodyAnswer, BodySolid, DrawingAnswer, EdgeAnswer, OutlineAnswer};
 
 /// Largest number of chords of a circle. On a radius of 1 m they are within 1 nm of it.
 const MOST_CHORDS: u32 = 100_000;
@@ -138,7 +140,7 @@ impl Ladder {
     fn new(body: &BodyAnswer, tolerance_mm: f64) -> Self {
         let line = |outline: &OutlineAnswer| line(outline, tolerance_mm);
         match (body.part, &body.outer, &body.holes[..]) {
-            (BodyPart::Carrier, OutlineAnswer::Path { edges }, _) => Self::finger(edges, tolerance_mm),
+            (Part::Carrier, OutlineAnswer::Path { edges }, _) => Self::finger(edges, tolerance_mm),
             (_, OutlineAnswer::Circle { radius_mm }, [hole]) => Self::to_circle(&line(hole), *radius_mm, tolerance_mm),
             (_, outer, [OutlineAnswer::Circle { radius_mm }]) => {
                 Self::to_circle(&line(outer), *radius_mm, tolerance_mm)

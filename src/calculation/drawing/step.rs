@@ -8,7 +8,9 @@
 use std::collections::HashMap;
 use std::io::{self, Write};
 
-use super::answer::{BodyAnswer, BodyPart, BodySolid, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use toothwave_solver::Part;
+
+use super::answer::{BodyAnswer, BodySolid, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
 use super::svg;
 use crate::json;
 
@@ -156,10 +158,10 @@ impl Step<'_> {
     /// Writes a part once, at its original position.
     fn part(&mut self, body: &BodyAnswer, hash: &str, frame: &Frame) -> io::Result<Product> {
         let (name, [red, green, blue]) = match body.part {
-            BodyPart::WaveGenerator => ("wave_generator", [0.33, 0.62, 0.84]),
-            BodyPart::Teeth => ("tooth", [0.94, 0.95, 0.96]),
-            BodyPart::Ring => ("ring", [0.55, 0.62, 0.70]),
-            BodyPart::Carrier => ("carrier_finger", [0.93, 0.72, 0.33]),
+            Part::WaveGenerator => ("wave_generator", [0.33, 0.62, 0.84]),
+            Part::Teeth => ("tooth", [0.94, 0.95, 0.96]),
+            Part::Ring => ("ring", [0.55, 0.62, 0.70]),
+            Part::Carrier => ("carrier_finger", [0.93, 0.72, 0.33]),
         };
         let name = format!("{name} {hash}");
         let solid = match (body.solid, &body.outer) {

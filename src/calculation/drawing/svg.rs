@@ -2,7 +2,9 @@
 
 use std::io::{self, Write};
 
-use super::answer::{BodyAnswer, BodyPart, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use toothwave_solver::Part;
+
+use super::answer::{BodyAnswer, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
 
 /// Margin around the drawing, as a share of the picture.
 const MARGIN: f64 = 0.03;
@@ -27,10 +29,10 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     )?;
     for body in &drawing.bodies {
         let (id, fill) = match body.part {
-            BodyPart::WaveGenerator => ("wave_generator", "#d9c7e8"),
-            BodyPart::Teeth => ("teeth", "#f3d9a4"),
-            BodyPart::Ring => ("ring", "#c9d6e4"),
-            BodyPart::Carrier => ("carrier", "#cfe3cd"),
+            Part::WaveGenerator => ("wave_generator", "#d9c7e8"),
+            Part::Teeth => ("teeth", "#f3d9a4"),
+            Part::Ring => ("ring", "#c9d6e4"),
+            Part::Carrier => ("carrier", "#cfe3cd"),
         };
         writeln!(writer, r#"<g id="{id}" fill="{fill}">"#)?;
         for placement in &body.placements {

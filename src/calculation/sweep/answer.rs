@@ -6,7 +6,7 @@ use toothwave_solver::backlash::Backlash;
 pub use toothwave_solver::mesh::TeethInMesh;
 pub use toothwave_solver::model_error::ModelError;
 pub use toothwave_solver::sweep::TorqueCapacity;
-use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, Peak, States};
+use toothwave_solver::sweep::{self as solver, ContactPeaks, Extremes, InputAngles, States};
 use toothwave_solver::{Drive, SolveError};
 use utoipa::ToSchema;
 
@@ -41,7 +41,7 @@ pub struct SweepAnswer {
     pub enters_under_load: bool,
     /// The largest force and stress of each contact, over the states. If the load along a tooth is uneven, stresses are
     /// those at its most loaded place (`fingers`).
-    pub peaks: PerContact<ContactPeaksAnswer>,
+    pub peaks: PerContact<ContactPeaks>,
     /// Numbers of teeth in mesh over the input angle: of one zone if the zones are alike, otherwise of all zones.
     pub teeth_in_mesh_per_zone: TeethInMesh,
     /// Numbers of teeth that carry load, over the input angles of the sweep. Clearance makes them fewer.
@@ -94,30 +94,6 @@ pub struct LoadAnswer {
     pub input_torque_nm: f64,
     /// Torque at the carrier, in N·m.
     pub output_torque_nm: f64,
-}
-
-/// The peaks of a contact.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct ContactPeaksAnswer {
-    /// Peak of the normal force, in N.
-    pub force_n: Peak,
-    /// Peak of the Hertz stress, in MPa.
-    pub stress_mpa: Peak,
-    /// Half the width of the contact, in the plane of motion, where the stress has its peak.
-    pub half_width_mm: f64,
-    /// Half the length of the contact along the axis at the stress peak, in mm. Only for balls.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    pub half_length_mm: Option<f64>,
-    /// Largest shear stress below the surface at the stress peak, in MPa. Left out for a flat, whose edges are not
-    /// modelled.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    pub shear_stress_mpa: Option<f64>,
-    /// Depth of that shear stress below the surface, in mm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    pub shear_depth_mm: Option<f64>,
 }
 
 /// Columns of equal length with one entry for each input angle and tooth in mesh, by input angle, then tooth number.
@@ -198,7 +174,7 @@ impl WindUpAnswer {
             let Extremes { least, largest } = Extremes::of(column);
             (largest - least) / drive.teeth_per_wave()
         });
-        let InputAngles { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth } =
+        let InputAngles { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth, .. } =
             sweep.input_angles.clone();
         Ok(Self {
             backlash: BacklashAnswer::of(backlash)?,
@@ -240,19 +216,6 @@ impl StatesAnswer {
             stress_wave_generator_mpa: states.stress_mpa.wave_generator,
             stress_ring_mpa: states.stress_mpa.ring,
             stress_carrier_mpa: states.stress_mpa.carrier,
-        }
-    }
-}
-
-impl From<ContactPeaks> for ContactPeaksAnswer {
-    fn from(ContactPeaks { force_n, stress_mpa, half_width_mm, half_length_mm, shear }: ContactPeaks) -> Self {
-        Self {
-            half_width_mm,
-            half_length_mm,
-            shear_stress_mpa: shear.map(|shear| shear.stress_mpa),
-            shear_depth_mm: shear.map(|shear| shear.depth_mm),
-            force_n,
-            stress_mpa,
         }
     }
 }

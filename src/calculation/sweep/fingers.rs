@@ -129,7 +129,7 @@ pub(super) fn checked(
 
 /// Returns losses with pressure and wear at the most loaded place along the teeth.
 fn losses_along(fingers: &CarrierFingers, mut totals: LossTotals) -> LossTotals {
-    for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
+    for contact in Contact::all() {
         if let Some(products) = &mut totals.pressure_velocity_mpa_m_per_s {
             products.get_mut(contact).value *= fingers.stress_factor(contact);
         }

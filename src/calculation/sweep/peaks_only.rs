@@ -3,18 +3,18 @@
 use crate::design::{Design, ModelDocument};
 use crate::findings::FindingAnswer;
 use crate::forms::{Form, Format, Forms};
-use crate::key::Encode;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, Stop};
 use crate::sweep::Sweep;
 use crate::sweep::answer::{
-    ChecksAnswer, ContactPeaksAnswer, LoadAnswer, ModelError, PerContact, SweepAnswer, TeethInMesh, TorqueCapacity,
+    ChecksAnswer, LoadAnswer, ModelError, PerContact, SweepAnswer, TeethInMesh, TorqueCapacity,
 };
 use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::fingers::FingersAnswer;
 use crate::sweep::losses::LossTotals;
 use serde::{Serialize, Serializer};
+use toothwave_solver::sweep::ContactPeaks;
 
 /// The question for a sweep without columns.
 #[derive(Debug)]
@@ -34,7 +34,7 @@ struct View<'a> {
     sweep_period_deg: Option<f64>,
     load: &'a LoadAnswer,
     enters_under_load: bool,
-    peaks: &'a PerContact<ContactPeaksAnswer>,
+    peaks: &'a PerContact<ContactPeaks>,
     model: &'a ModelDocument,
     model_error: &'a ModelError,
     series_compliance_estimates: &'a [EstimateAnswer],
@@ -96,7 +96,7 @@ impl Question for PeaksOnly {
         "peaks"
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
         Sweep.reads(design)
     }
 

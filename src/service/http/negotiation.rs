@@ -8,9 +8,9 @@ use axum::extract::Query;
 use axum::http::{HeaderMap, HeaderName, Uri, header};
 use headers_accept::Accept;
 use mediatype::{MediaType, names};
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toothwave_calculation::forms::{CsvOptions, Format, Forms};
-use toothwave_calculation::key::{Encode, Encoder};
 
 use super::problem::{Problem, ProblemCode};
 
@@ -18,19 +18,12 @@ use super::problem::{Problem, ProblemCode};
 const MOST_OF_A_LIST: usize = 4096;
 
 /// A format with its content coding. Each representation has its own entity tag.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Representation {
     /// The format.
     pub format: Format,
     /// True if it is compressed.
     pub gzip: bool,
-}
-
-impl Encode for Representation {
-    fn encode(&self, encoder: &mut Encoder) {
-        let Self { format, gzip } = self;
-        (format, gzip).encode(encoder);
-    }
 }
 
 impl Representation {

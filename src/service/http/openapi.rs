@@ -3,10 +3,11 @@
 use serde_json::{Map, Value, json};
 
 use super::problem::PROBLEM_JSON;
+use super::ranges::put_ranges;
 
-const SCHEMAS: &str = "/components/schemas";
+pub(super) const SCHEMAS: &str = "/components/schemas";
 
-/// Adds what utoipa cannot express: the server, one `Problem` for all, and named variants with a discriminator.
+/// Adds what utoipa cannot express: the server, one `Problem` for all, named variants with a discriminator, and ranges.
 pub(crate) fn for_generators(document: &mut Value) {
     document["servers"] = json!([{ "url": ".", "description": "The service that serves this document." }]);
     for_each_object(document, &mut |object| {
@@ -19,6 +20,7 @@ pub(crate) fn for_generators(document: &mut Value) {
     default_words_beside_their_words(document);
     join_variants(document);
     name_variants(document);
+    put_ranges(document);
 }
 
 /// Joins a variant's schema and the schema of its tag to one object. With `additionalProperties: false`, `allOf` of the

@@ -1,8 +1,7 @@
 //! Given stiffnesses.
 
-use super::{Law, LawName, Suits, Term};
+use super::{Law, LawName, Suits, Term, ToothSize};
 use crate::contact::{Contact, Materials, PerContact};
-use crate::tooth::ToothSize;
 use crate::violation::Parameter;
 
 /// Stiffnesses in N/mm.

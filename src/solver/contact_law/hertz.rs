@@ -1,8 +1,7 @@
 //! Hertz's law of point contacts.
 
-use super::{Law, LawName, Suits, Term};
+use super::{Law, LawName, Suits, Term, ToothSize};
 use crate::contact::{Contact, Materials};
-use crate::tooth::ToothSize;
 
 pub(super) struct Hertz;
 

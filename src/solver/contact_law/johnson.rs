@@ -2,9 +2,8 @@
 
 use std::f64::consts::{LN_2, PI};
 
-use super::{Law, LawName, LogarithmicTerm, Suits, Term};
+use super::{Law, LawName, LogarithmicTerm, Suits, Term, ToothSize};
 use crate::contact::{Contact, Materials, PerContact};
-use crate::tooth::ToothSize;
 use crate::violation::Parameter;
 
 /// Half-width of a line contact over the lesser of tooth radius and depth, above which the law gets a finding.

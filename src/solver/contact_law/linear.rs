@@ -2,9 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::{Law, LawName, Suits, Term};
+use super::{Law, LawName, Suits, Term, ToothSize};
 use crate::contact::{Contact, Materials};
-use crate::tooth::ToothSize;
 
 pub(super) struct Linear;
 

@@ -12,7 +12,6 @@ mod term;
 
 use crate::contact::{Contact, Materials, PerContact};
 use crate::drive::ToothShape;
-use crate::tooth::{ToothContact, ToothSize};
 use crate::violation::Parameter;
 
 pub(crate) use johnson::{WIDE_SHARE, WIDEST_SHARE};
@@ -63,6 +62,21 @@ pub(crate) enum Suits {
     Lines,
     /// Balls.
     Balls,
+}
+
+/// Where teeth touch at a contact: along a line, in an ellipse, or with a flat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Touch {
+    Line,
+    Ellipse,
+    Flat,
+}
+
+/// Radius and width of a tooth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ToothSize {
+    pub(crate) radius_mm: f64,
+    pub(crate) width_mm: f64,
 }
 
 /// A contact law.
@@ -154,21 +168,12 @@ impl ContactLaw {
         Some(PerContact::of(|contact| depth_mm.get(contact).min(tooth_radius_mm)))
     }
 
-    /// Returns the approach at one contact of a tooth; none if the law is not for teeth of this shape.
-    pub(crate) fn term(
-        &self,
-        shape: &ToothContact,
-        contact: Contact,
-        materials: &Materials,
-        tooth: ToothSize,
-    ) -> Option<Term> {
-        let is_ball = matches!(shape, ToothContact::Ball { .. });
-        let is_flat = contact == Contact::Carrier && matches!(shape, ToothContact::FlatSided { .. });
-        self.law(|law| match law.suits() {
-            Suits::Lines if is_flat => Some(Term::Flat),
-            Suits::Lines if is_ball => None,
-            Suits::Balls if !is_ball => None,
-            Suits::All | Suits::Lines | Suits::Balls => Some(law.term(contact, materials, tooth)),
+    /// Returns the approach at one contact of a tooth; none if the law is not for teeth that touch so.
+    pub(crate) fn term(&self, touch: Touch, contact: Contact, materials: &Materials, tooth: ToothSize) -> Option<Term> {
+        self.law(|law| match (law.suits(), touch) {
+            (Suits::Lines, Touch::Flat) => Some(Term::Flat),
+            (Suits::Lines, Touch::Ellipse) | (Suits::Balls, Touch::Line | Touch::Flat) => None,
+            _ => Some(law.term(contact, materials, tooth)),
         })
     }
 }

@@ -1,8 +1,7 @@
 //! Palmgren's power law for steel on steel.
 
-use super::{Law, LawName, Suits, Term};
+use super::{Law, LawName, Suits, Term, ToothSize};
 use crate::contact::{Contact, Materials};
-use crate::tooth::ToothSize;
 
 /// Power of the force.
 pub(crate) const EXPONENT: f64 = 0.9;

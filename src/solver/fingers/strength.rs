@@ -1,15 +1,21 @@
 //! Strength of a material, and safety under a load that comes and goes (docs/explanation/theory.md section 4.12).
 
-/// Strength of a material.
+/// Strength of a material, in MPa.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(deny_unknown_fields, expecting = "an object"), schema(as = StrengthNumbersDocument))]
 pub struct Strength {
-    /// Yield strength `R_p0.2`, in MPa.
+    /// Yield strength R_p0.2, in MPa.
+    #[cfg_attr(feature = "document", serde(rename = "yield_strength_mpa"))]
     pub yield_mpa: f64,
-    /// Tensile strength `R_m`, in MPa.
+    /// Tensile strength R_m, in MPa.
+    #[cfg_attr(feature = "document", serde(rename = "tensile_strength_mpa"))]
     pub tensile_mpa: f64,
-    /// Endurance limit `σ_W` under reversed load, without a notch, in MPa.
+    /// Endurance limit σ_W under reversed load, without a notch, in MPa.
+    #[cfg_attr(feature = "document", serde(rename = "endurance_limit_mpa"))]
     pub endurance_mpa: f64,
-    /// True if the material breaks at a notch before it yields there.
+    /// True if the material breaks at a notch before it yields there, as hardened steel does. Default: false.
+    #[cfg_attr(feature = "document", serde(rename = "hardened", default), schema(default = false))]
     pub is_hardened: bool,
 }
 

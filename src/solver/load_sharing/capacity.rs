@@ -1,7 +1,7 @@
 //! Torque at which a contact reaches its allowable stress, or Johnson's law ends.
 
+use super::equilibrium::ToothState;
 use super::loaded_drive::LoadedDrive;
-use super::tooth_state::ToothState;
 use crate::SolveError;
 use crate::contact::{Contact, PerContact, half_width_mm};
 use crate::contact_law::WIDEST_SHARE;

@@ -1,10 +1,46 @@
 //! Equilibrium of a tooth: its forces over `F_H`, and the weights of its approaches in compatibility.
 
-use super::load::Compatibility;
 use crate::cam::ToothCenter;
 use crate::contact::PerContact;
 use crate::drive::Drive;
 use crate::ring::{FlankPoint, RingFlank};
+use crate::springs::Spring;
+use crate::tooth::Pressure;
+
+/// Rule by which the approaches at a tooth's contacts add up to the rotation of the wave generator.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
+pub enum Compatibility {
+    /// The paper's (equations 3 to 6): each projected on the direction of the wave generator's force.
+    Projection,
+    /// Virtual work: the frictionless solution for a tooth whose centre is free to move.
+    #[default]
+    VirtualWork,
+}
+
+/// State of a tooth at a position: geometry, force ratios and its spring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToothState {
+    /// Centre of the tooth and its contact with the cam.
+    pub center: ToothCenter,
+    /// Contact with the ring.
+    pub flank: FlankPoint,
+    /// Forces over `F_H`.
+    pub force_ratio: PerContact<f64>,
+    /// Relative curvature of each contact in the plane of motion, in 1/mm.
+    pub curvature_per_mm: PerContact<f64>,
+    /// Pressure model of each contact.
+    pub pressure: PerContact<Pressure>,
+    /// Spring of the tooth in load sharing.
+    pub spring: Spring,
+}
+
+impl AsRef<Spring> for ToothState {
+    fn as_ref(&self) -> &Spring {
+        &self.spring
+    }
+}
 
 /// Contribution of each contact's approach to the displacement ξ along `F_H`.
 pub(super) struct Weights(pub(super) PerContact<f64>);

@@ -1,6 +1,6 @@
 //! A load: torque, materials, contact law, compatibility, clearances and profile modifications.
 
-use super::equilibrium::Weights;
+use super::equilibrium::{Compatibility, Weights};
 use crate::contact::{Material, Materials, Part, PerContact};
 use crate::contact_law::ContactLaw;
 use crate::drive::{Draft, Drive, DriveParameters, ToothShape};
@@ -10,18 +10,6 @@ use crate::parts::CarrierRadii;
 use crate::ring::{FlankEnd, RingTooth};
 use crate::root::NotConverged;
 use crate::violation::{Parameter, Violation};
-
-/// Rule by which the approaches at a tooth's contacts add up to the rotation of the wave generator.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
-#[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
-pub enum Compatibility {
-    /// The paper's (equations 3 to 6): each projected on the direction of the wave generator's force.
-    Projection,
-    /// Virtual work: the frictionless solution for a tooth whose centre is free to move.
-    #[default]
-    VirtualWork,
-}
 
 /// Torque that the drive transmits, ring fixed.
 #[derive(Debug, Clone, Copy, PartialEq)]

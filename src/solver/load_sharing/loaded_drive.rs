@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use super::load::{Compatibility, LoadCase};
-use super::tooth_state::ToothState;
+use super::equilibrium::{Compatibility, ToothState};
+use super::load::LoadCase;
 use crate::SolveError;
 use crate::contact::{Contact, HertzLine, PerContact};
-use crate::contact_law::ContactLaw;
+use crate::contact_law::{ContactLaw, ToothSize};
 use crate::drive::{Drive, ToothShape};
 use crate::gaps::{Deviations, Gaps};
 use crate::mesh::{Mesh, Place};
@@ -14,7 +14,7 @@ use crate::ring::TipCorner;
 use crate::ring_bending::RingBending;
 use crate::root::NotConverged;
 use crate::springs::{Springs, WindUp};
-use crate::tooth::{BallContact, Contacts, Flat, ToothContact, ToothLaw, ToothSize};
+use crate::tooth::{BallContact, Contacts, Flat, ToothContact, ToothLaw};
 use crate::violation::Violation;
 
 /// A drive under a load, with everything precomputed that does not depend on the position.

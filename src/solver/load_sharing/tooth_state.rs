@@ -1,7 +1,6 @@
 //! State of a tooth at a position: geometry, gaps, pressure models, spring.
 
-use super::equilibrium::{Weights, curvature_per_mm, force_ratio, force_ratio_at_corner};
-use super::load::Compatibility;
+use super::equilibrium::{Compatibility, ToothState, Weights, curvature_per_mm, force_ratio, force_ratio_at_corner};
 use super::loaded_drive::LoadedDrive;
 use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
@@ -12,29 +11,6 @@ use crate::root::NotConverged;
 use crate::springs::{Gap, Spring};
 use crate::tooth::{CornerContact, Pressure};
 use crate::{SolveError, tooth};
-
-/// State of a tooth at a position: geometry, force ratios and its spring.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ToothState {
-    /// Centre of the tooth and its contact with the cam.
-    pub center: ToothCenter,
-    /// Contact with the ring.
-    pub flank: FlankPoint,
-    /// Forces over `F_H`.
-    pub force_ratio: PerContact<f64>,
-    /// Relative curvature of each contact in the plane of motion, in 1/mm.
-    pub curvature_per_mm: PerContact<f64>,
-    /// Pressure model of each contact.
-    pub pressure: PerContact<Pressure>,
-    /// Spring of the tooth in load sharing.
-    pub spring: Spring,
-}
-
-impl AsRef<Spring> for ToothState {
-    fn as_ref(&self) -> &Spring {
-        &self.spring
-    }
-}
 
 impl<'a> LoadedDrive<'a> {
     /// Returns the corner that a tooth before the flank meets first.

@@ -116,6 +116,7 @@ pub struct LossTotals {
 
 /// Friction losses of a drive under its duty.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct DutyLosses {
     /// Totals over all points.
     pub totals: LossTotals,
@@ -129,6 +130,7 @@ pub struct DutyLosses {
 
 /// Friction losses at one point of a duty.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct PointLosses {
     /// Efficiency with the ring fixed.
     pub efficiency_ring_fixed: f64,

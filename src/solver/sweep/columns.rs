@@ -7,6 +7,6 @@ mod states;
 pub use checks::TorqueBalance;
 pub(crate) use checks::{check, finished, worse};
 pub(crate) use peaks::AngleExtremes;
-pub use peaks::{ContactPeaks, Extremes, Peak, PeakShear, SweepPeaks, TorqueCapacity};
+pub use peaks::{ContactPeaks, Extremes, Peak, SweepPeaks, TorqueCapacity};
 pub(crate) use states::{Columns, PeakAt};
 pub use states::{InputAngles, States, Sweep};

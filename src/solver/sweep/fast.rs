@@ -269,7 +269,7 @@ impl Kernel {
     ) -> Result<(), SolveError> {
         if !matches!(self.pressures, Pressures::Lines) {
             let lobes = loaded.drive().lobes();
-            for contact in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier] {
+            for contact in Contact::all() {
                 let peak = peaks.get_mut(contact);
                 let position = Position::from_lobe(peak.stress_mpa.position_deg.to_radians(), lobes);
                 let pressure = loaded.pressure_at(position, contact)?;

@@ -18,7 +18,7 @@ use crate::{SolveError, Stop};
 use adaptive::Looking;
 
 pub use columns::{
-    ContactPeaks, Extremes, InputAngles, Peak, PeakShear, States, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity,
+    ContactPeaks, Extremes, InputAngles, Peak, States, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity,
 };
 pub use limited_by::LimitedBy;
 pub use points::{Points, Tolerance};

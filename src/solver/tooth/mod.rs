@@ -11,7 +11,7 @@ use point::EllipticContact;
 
 use crate::approach::{Approach, Corner, Logarithmic};
 use crate::contact::{Contact, HertzLine, Materials, PerContact};
-use crate::contact_law::{ContactLaw, LogarithmicTerm, PALMGREN_EXPONENT, Term};
+use crate::contact_law::{ContactLaw, LogarithmicTerm, PALMGREN_EXPONENT, Term, ToothSize, Touch};
 use crate::drive::{Drive, ToothShape};
 use crate::parts::CarrierRadii;
 use crate::root::NotConverged;
@@ -51,6 +51,14 @@ impl ToothContact {
                 let [carrier_inner_radius_mm, carrier_outer_radius_mm] = carrier.of(drive);
                 Self::FlatSided { flat_length_mm, carrier_inner_radius_mm, carrier_outer_radius_mm }
             }
+        }
+    }
+
+    const fn touch(&self, contact: Contact) -> Touch {
+        match (self, contact) {
+            (Self::Ball { .. }, _) => Touch::Ellipse,
+            (Self::FlatSided { .. }, Contact::Carrier) => Touch::Flat,
+            (Self::Cylinder | Self::FlatSided { .. }, _) => Touch::Line,
         }
     }
 }
@@ -173,13 +181,6 @@ pub(crate) struct Contacts {
     series_compliance_mm_per_n: PerContact<f64>,
 }
 
-/// Radius and width of a tooth.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ToothSize {
-    pub(crate) radius_mm: f64,
-    pub(crate) width_mm: f64,
-}
-
 /// Returns the approach at the wave generator under a force, by a law of cylinders that does not depend on the place.
 pub(crate) fn plain_approach_mm(
     law: &ContactLaw,
@@ -188,7 +189,7 @@ pub(crate) fn plain_approach_mm(
     force_n: f64,
 ) -> Option<f64> {
     let size = ToothSize { radius_mm: 0.0, width_mm: tooth_width_mm };
-    match law.term(&ToothContact::Cylinder, Contact::WaveGenerator, materials, size)? {
+    match law.term(Touch::Line, Contact::WaveGenerator, materials, size)? {
         Term::Linear { compliance_mm_per_n } => Some(compliance_mm_per_n * force_n),
         Term::Power { exponent, coefficient } => Some(coefficient * force_n.powf(exponent)),
         Term::Logarithmic(_) | Term::Ellipse | Term::Flat => None,
@@ -215,7 +216,7 @@ impl Contacts {
         size: ToothSize,
         series_compliance_mm_per_n: &PerContact<f64>,
     ) -> Option<Self> {
-        let law = |contact| law.term(shape, contact, materials, size);
+        let law = |contact| law.term(shape.touch(contact), contact, materials, size);
         let laws = PerContact {
             wave_generator: law(Contact::WaveGenerator)?,
             ring: law(Contact::Ring)?,

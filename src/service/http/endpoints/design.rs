@@ -10,7 +10,6 @@ use toothwave_calculation::coincidence_degree::{CoincidenceDegree, CoincidenceDe
 use toothwave_calculation::design::Design;
 use toothwave_calculation::forms::{Form, Format, Forms};
 use toothwave_calculation::geometry::{Geometry, GeometryAnswer};
-use toothwave_calculation::key::Encode;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question, Stop};
 use toothwave_calculation::sweep::Sweep;
@@ -94,7 +93,7 @@ impl Question for WholeDesign {
         "design"
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Encode + 'a {
+    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
         let Limits { max_states, max_profile_points, max_searched_states } = self.0;
         let limits = (max_states, max_profile_points, max_searched_states);
         (Geometry.reads(design), CoincidenceDegree.reads(design), Sweep.reads(design), limits)

@@ -1,6 +1,5 @@
 //! Peaks of a sweep, and its torque capacity.
 
-use super::states::Sweep;
 use crate::contact::{Contact, Materials, PerContact, SHEAR_DEPTH, SHEAR_SHARE, half_width_mm};
 use crate::drive::Drive;
 use crate::mesh::TeethInMesh;
@@ -20,20 +19,27 @@ pub struct Peak {
     pub position_deg: f64,
 }
 
-/// Peaks of a contact.
+/// The peaks of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), schema(as = ContactPeaksAnswer))]
+#[non_exhaustive]
 pub struct ContactPeaks {
-    /// Peak of the force, in N.
+    /// Peak of the normal force, in N.
     pub force_n: Peak,
-    /// Peak of the stress, in MPa.
+    /// Peak of the Hertz stress, in MPa.
     pub stress_mpa: Peak,
-    /// Half the width of the contact in the plane of motion at the stress peak, in mm.
+    /// Half the width of the contact, in the plane of motion, where the stress has its peak.
     pub half_width_mm: f64,
-    /// Half the length of a contact ellipse along the axis at the stress peak, in mm.
+    /// Half the length of the contact along the axis at the stress peak, in mm. Only for balls.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
     pub half_length_mm: Option<f64>,
-    /// Largest shear stress below the surface at the stress peak, and its depth. None for a flat, whose edges are not
+    /// Largest shear stress below the surface at the stress peak, in MPa. Left out for a flat, whose edges are not
     /// modelled.
-    pub shear: Option<PeakShear>,
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    pub shear_stress_mpa: Option<f64>,
+    /// Depth of that shear stress below the surface, in mm.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    pub shear_depth_mm: Option<f64>,
 }
 
 impl ContactPeaks {
@@ -45,15 +51,11 @@ impl ContactPeaks {
             stress_mpa: stress_peak_mpa,
             half_width_mm,
             half_length_mm: None,
-            shear: Some(PeakShear {
-                stress_mpa: SHEAR_SHARE * stress_peak_mpa.value,
-                depth_mm: SHEAR_DEPTH * half_width_mm,
-            }),
+            shear_stress_mpa: Some(SHEAR_SHARE * stress_peak_mpa.value),
+            shear_depth_mm: Some(SHEAR_DEPTH * half_width_mm),
         }
     }
-}
 
-impl ContactPeaks {
     /// Returns these peaks with the data of a contact of this pressure model and force `force_n` at its stress peak.
     pub(crate) fn of_pressure(
         self,
@@ -64,40 +66,38 @@ impl ContactPeaks {
     ) -> Self {
         match pressure {
             Pressure::Line { .. } | Pressure::Corner(_) => self,
-            Pressure::Flat(flat) => Self { half_width_mm: 0.5 * flat.length_mm(), shear: None, ..self },
+            Pressure::Flat(flat) => {
+                let half_width_mm = 0.5 * flat.length_mm();
+                Self { half_width_mm, shear_stress_mpa: None, shear_depth_mm: None, ..self }
+            }
             Pressure::Ellipse(ellipse) => {
                 let half_width_mm = ellipse.half_width_mm(force_n);
                 let half_length_mm = ellipse.half_length_mm(force_n);
                 let shear = |poissons_ratio: f64| {
                     let ShearBelow { share, depth } = ellipse.shear_below(poissons_ratio);
-                    PeakShear {
-                        stress_mpa: share * self.stress_mpa.value,
-                        depth_mm: depth * half_width_mm.min(half_length_mm),
-                    }
+                    (share * self.stress_mpa.value, depth * half_width_mm.min(half_length_mm))
                 };
                 // The larger of the values in the two bodies.
                 let [tooth, partner] = [&materials.teeth, materials.partner(contact)].map(|body| body.poissons_ratio);
                 let (of_tooth, are_alike) = (shear(tooth), partner.to_bits() == tooth.to_bits());
                 let of_partner = if are_alike { of_tooth } else { shear(partner) };
-                let shear = if of_partner.stress_mpa > of_tooth.stress_mpa { of_partner } else { of_tooth };
-                Self { half_width_mm, half_length_mm: Some(half_length_mm), shear: Some(shear), ..self }
+                let (stress_mpa, depth_mm) = if of_partner.0 > of_tooth.0 { of_partner } else { of_tooth };
+                Self {
+                    half_width_mm,
+                    half_length_mm: Some(half_length_mm),
+                    shear_stress_mpa: Some(stress_mpa),
+                    shear_depth_mm: Some(depth_mm),
+                    ..self
+                }
             }
         }
     }
 }
 
-/// Largest shear stress below the surface of a contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PeakShear {
-    /// Shear stress, in MPa.
-    pub stress_mpa: f64,
-    /// Depth below the surface, in mm.
-    pub depth_mm: f64,
-}
-
 /// Torque capacity and the contact that limits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+#[non_exhaustive]
 pub struct TorqueCapacity {
     /// Largest torque at the wave generator under which no contact exceeds its allowable stress and no finger of the
     /// carrier its strength, in N·m.
@@ -227,18 +227,5 @@ impl SweepPeaks {
     /// Returns the transmission error under load, peak to peak: the range of the wind-up, referred to the output.
     pub fn transmission_error_peak_to_peak_deg(&self, drive: &Drive) -> f64 {
         (self.wind_up_deg.largest - self.wind_up_deg.least) / drive.teeth_per_wave()
-    }
-}
-
-impl From<&Sweep> for SweepPeaks {
-    fn from(sweep: &Sweep) -> Self {
-        Self {
-            contacts: sweep.peaks,
-            wind_up_deg: Extremes::of(&sweep.input_angles.wind_up_deg),
-            torsional_stiffness_nm_per_rad: Extremes::of(&sweep.input_angles.torsional_stiffness_nm_per_rad),
-            loaded_teeth: sweep.loaded_teeth(),
-            torque_capacity: sweep.torque_capacity,
-            torque_balance_residual: sweep.torque_balance_residual,
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! Columns of a sweep: states of the teeth, and quantities of all teeth at each input angle.
 
-use super::peaks::{ContactPeaks, Peak, TorqueCapacity};
+use super::peaks::{ContactPeaks, Extremes, Peak, SweepPeaks, TorqueCapacity};
 use crate::contact::PerContact;
 use crate::drive::Drive;
 use crate::mesh::{Mesh, TeethInMesh};
@@ -9,6 +9,7 @@ use crate::springs::WindUp;
 /// States of a sweep, by input angle and then tooth number: columns of equal length with one entry for each state. If
 /// the zones are alike, the teeth of one zone represent all. Otherwise the teeth of all zones are listed ([`Mesh`]).
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct States {
     /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
@@ -32,6 +33,7 @@ pub struct States {
 
 /// Quantities of all teeth together at an input angle: columns of equal length with one entry for each input angle.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct InputAngles {
     /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
@@ -68,15 +70,27 @@ pub struct Sweep {
 impl Sweep {
     /// Returns the transmission error under load, peak to peak: the range of the wind-up, referred to the output.
     pub fn transmission_error_peak_to_peak_deg(&self, drive: &Drive) -> f64 {
-        let wind_up_deg = self.input_angles.wind_up_deg.iter().copied();
-        let most = wind_up_deg.clone().fold(f64::NEG_INFINITY, f64::max);
-        (most - wind_up_deg.fold(f64::INFINITY, f64::min)) / drive.teeth_per_wave()
+        let Extremes { least, largest } = Extremes::of(&self.input_angles.wind_up_deg);
+        (largest - least) / drive.teeth_per_wave()
     }
 
     /// Returns the least and the largest number of teeth in a zone that are in mesh with their gaps closed.
     pub fn loaded_teeth(&self) -> TeethInMesh {
         let teeth = self.input_angles.loaded_teeth.iter().map(|&teeth| u64::from(teeth));
         TeethInMesh { min: teeth.clone().min().unwrap_or(0), max: teeth.max().unwrap_or(0) }
+    }
+}
+
+impl From<&Sweep> for SweepPeaks {
+    fn from(sweep: &Sweep) -> Self {
+        Self {
+            contacts: sweep.peaks,
+            wind_up_deg: Extremes::of(&sweep.input_angles.wind_up_deg),
+            torsional_stiffness_nm_per_rad: Extremes::of(&sweep.input_angles.torsional_stiffness_nm_per_rad),
+            loaded_teeth: sweep.loaded_teeth(),
+            torque_capacity: sweep.torque_capacity,
+            torque_balance_residual: sweep.torque_balance_residual,
+        }
     }
 }
 

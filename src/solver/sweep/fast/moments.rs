@@ -158,7 +158,7 @@ impl<'a> FastLook<'a> {
             let (rotation_rad, stiffness) = (tile.row_rotation_rad[row], tile.row_stiffness[row]);
             let values = seen.push(fraction);
             let scale = &tile.scale[at.clone()];
-            for (index, contact) in [Contact::WaveGenerator, Contact::Ring, Contact::Carrier].into_iter().enumerate() {
+            for (index, contact) in Contact::all().into_iter().enumerate() {
                 let (force, stress) = (&tile.force.get(contact)[at.clone()], &tile.stress.get(contact)[at.clone()]);
                 let forces = &mut values[index * teeth..(index + 1) * teeth];
                 for i in 0..teeth {

@@ -102,7 +102,7 @@ impl<'a> ColumnSink<'a> {
                 column.copy_from_slice(&of_tile[at]);
             });
         }
-        for contact in CONTACTS {
+        for contact in Contact::all() {
             let [force, stress] = peaks.get_mut(contact);
             for (column, unit, factor, peak) in [
                 (states.force_n.get_mut(contact), tile.force.get(contact), &*tile.scale, force),
@@ -178,7 +178,7 @@ impl Sink for ColumnSink<'_> {
         states.center_radius_mm.extend_from_slice(&tile.center_radius_mm[..count]);
         states.wave_generator_angle_deg.extend_from_slice(&tile.wave_generator_angle_deg[..count]);
         states.ring_angle_deg.extend_from_slice(&tile.ring_angle_deg[..count]);
-        for contact in CONTACTS {
+        for contact in Contact::all() {
             let (scale, root) = (&tile.scale[..count], &tile.stress_scale(contact)[..count]);
             let [force, stress] = self.peaks.get_mut(contact);
             force.append(states.force_n.get_mut(contact), tile.force.get(contact), scale);
@@ -186,8 +186,6 @@ impl Sink for ColumnSink<'_> {
         }
     }
 }
-
-const CONTACTS: [Contact; 3] = [Contact::WaveGenerator, Contact::Ring, Contact::Carrier];
 
 /// Largest value of a growing column, and the first state of its tile.
 #[derive(Clone, Copy, Default)]
@@ -279,7 +277,7 @@ impl Sink for PeakSink {
     fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize, _: u64, _: &LapTeeth) {
         let (count, rows) = (tile.count, tile.count / teeth);
         self.angles.take(drive, tile, rows);
-        for contact in CONTACTS {
+        for contact in Contact::all() {
             scale(tile.force.get_mut(contact), tile.scale, count);
             let is_one = tile.stress_exponents.is_one_at(contact);
             scale(tile.stress.get_mut(contact), if is_one { tile.scale } else { tile.scale_root }, count);
