@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::iter;
 use std::ops::{Range, RangeInclusive};
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use toothwave_calculation::json::Tree;
 use toothwave_solver::Stop;
 use utoipa::ToSchema;
@@ -31,7 +31,8 @@ pub(crate) trait Rows {
 pub struct RowsPart {
     /// Variants with quantities.
     pub(crate) answered: Vec<u64>,
-    /// One column for each quantity.
+    /// One column for each quantity; NaN for a drive that does not have it.
+    #[serde(deserialize_with = "with_absent")]
     pub(crate) columns: Vec<Vec<f64>>,
     /// Variants without quantities.
     pub(crate) refused: Vec<u64>,
@@ -47,6 +48,13 @@ pub(crate) struct RefusalNoted {
     pub(crate) detail: String,
     pub(crate) first: u64,
     pub(crate) count: u64,
+}
+
+/// Reads columns, in which JSON has null for NaN.
+fn with_absent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vec<f64>>, D::Error> {
+    let columns = Vec::<Vec<Option<f64>>>::deserialize(deserializer)?;
+    let numbers = |column: Vec<Option<f64>>| column.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect();
+    Ok(columns.into_iter().map(numbers).collect())
 }
 
 impl RefusalNoted {
@@ -231,11 +239,11 @@ impl RowsParts<'_> {
         })
     }
 
-    /// Returns the values of a quantity in these variants.
+    /// Returns the values of a quantity in those of these variants that have it.
     pub(crate) fn values(&self, quantity: usize, variants: RangeInclusive<u64>) -> Vec<f64> {
         let mut values = Vec::with_capacity(self.within(variants.clone()).map(|(_, rows)| rows.len()).sum());
         for (part, rows) in self.within(variants) {
-            values.extend_from_slice(&part.columns[quantity][rows]);
+            values.extend(part.columns[quantity][rows].iter().filter(|value| !value.is_nan()));
         }
         values
     }
@@ -326,7 +334,8 @@ impl From<&RefusalNoted> for ReasonAnswer {
 pub struct PossibleAnswer {
     /// Numbers of the variants.
     pub variant: Vec<u64>,
-    /// One column for each quantity, by name.
+    /// One column for each quantity, by name; null for a drive that does not have it.
+    #[schema(value_type = BTreeMap<String, Vec<Option<f64>>>)]
     pub quantities: BTreeMap<&'static str, Vec<f64>>,
 }
 
