@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::iter;
 use std::ops::{Range, RangeInclusive};
 
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use toothwave_calculation::json::Tree;
 use toothwave_solver::Stop;
 use utoipa::ToSchema;
@@ -32,7 +32,6 @@ pub struct RowsPart {
     /// Variants with quantities.
     pub(crate) answered: Vec<u64>,
     /// One column for each quantity; NaN for a drive that does not have it.
-    #[serde(deserialize_with = "with_absent")]
     pub(crate) columns: Vec<Vec<f64>>,
     /// Variants without quantities.
     pub(crate) refused: Vec<u64>,
@@ -48,13 +47,6 @@ pub(crate) struct RefusalNoted {
     pub(crate) detail: String,
     pub(crate) first: u64,
     pub(crate) count: u64,
-}
-
-/// Reads columns, in which JSON has null for NaN.
-fn with_absent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vec<f64>>, D::Error> {
-    let columns = Vec::<Vec<Option<f64>>>::deserialize(deserializer)?;
-    let numbers = |column: Vec<Option<f64>>| column.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect();
-    Ok(columns.into_iter().map(numbers).collect())
 }
 
 impl RefusalNoted {
