@@ -373,10 +373,10 @@ impl Design {
         })
     }
 
-    /// Returns the supports of the parts, as far as given.
+    /// Returns the supports of the parts, given or by default.
     pub fn support(&self) -> Support {
         let PartsDocument { ring, carrier, .. } = &self.parts;
-        Support { fingers: carrier.fingers, rim: ring.rim }
+        Support { fingers: carrier.fingers.unwrap_or_default(), rim: ring.rim.unwrap_or_default() }
     }
 
     /// Returns the parameters of the carrier's fingers.

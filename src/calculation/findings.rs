@@ -204,11 +204,8 @@ impl Text {
             Code::SlenderFingers => text(
                 &["/parts/carrier/fingers", "/model/series_compliance_mm_per_n/carrier", WIDTH],
                 "",
-                format!(
-                    "the carrier's fingers, {}, bend under their teeth: by an estimate they add this share to what a tooth gives way at its contacts, and forces and wind-up leave it out",
-                    if is_grave { "held as they are" } else { "even if held at both ends" }
-                ),
-                "give the estimate as the carrier's series compliance, or make the fingers shorter or thicker",
+                "the carrier's fingers, whose far ends a ring joins unless `parts` specifies another support, bend under their teeth: by an estimate they add this share to what a tooth gives way at its contacts, and forces and wind-up leave it out",
+                "give the estimate as the carrier's series compliance, hold the fingers at both ends, or make them shorter or thicker",
             ),
             Code::SoftRim => text(
                 &["/parts/ring/rim", "/parts/ring/outer_radius_mm", "/model/series_compliance_mm_per_n/ring"],

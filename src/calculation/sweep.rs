@@ -305,12 +305,12 @@ impl Question for Sweep {
         let of_contacts = findings::of_contacts(drive, load, &peaks, approaches_matter);
         let finger_stress = checked.finger_stress(&sweep.peaks);
         let of_fingers = finger_stress.as_ref().and_then(findings::of_fingers);
-        let of_half_widths = findings::of_half_widths(drive, load, &sweep.states);
+        let of_half_widths = findings::of_half_widths(drive, load, &sweep.states, checked.load_peak_over_mean());
         let of_wind_up = findings::of_wind_up(drive, load, &sweep);
         let of_projection = findings::of_projection(drive, load).map_err(SolveError::from)?;
         let shares = Shares::of(drive, load, backings, &sweep.peaks);
         let of_backing = shares.as_ref().map_or_else(Vec::new, findings::of_backing);
-        let parts = shares.as_ref().map(|shares| (backings.support(), shares));
+        let parts = shares.as_ref().map(|shares| (backings, shares));
         go_on()?;
         let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
         go_on()?;

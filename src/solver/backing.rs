@@ -7,30 +7,32 @@ use std::f64::consts::PI;
 use crate::contact::{Contact, Material, Materials, Part, PerContact};
 use crate::contact_law::ContactLaw;
 use crate::drive::{Draft, Drive, ToothShape};
-use crate::fingers::{FingerBeam, Fingers};
+use crate::fingers::{CarrierFingers, FingerBeam, FingerParameters, Fingers};
 use crate::gaps::MM_PER_UM;
 use crate::load_sharing::{LoadCase, LoadParameters};
 use crate::parts::{CarrierPart, PartsParameters, RIM};
+use crate::root::NotConverged;
 use crate::sweep::ContactPeaks;
 
 /// Support of the ring.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
 #[cfg_attr(feature = "document", serde(rename_all = "snake_case"))]
 pub enum Rim {
     /// A rigid housing.
+    #[default]
     Housed,
     /// No housing: only its rotation is blocked.
     Free,
 }
 
-/// Support of the parts, as far as the designer specifies it.
+/// Support of the parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Support {
     /// Support of the carrier's fingers.
-    pub fingers: Option<Fingers>,
+    pub fingers: Fingers,
     /// Support of the ring's rim.
-    pub rim: Option<Rim>,
+    pub rim: Rim,
 }
 
 /// Compliant part behind a contact.
@@ -65,16 +67,16 @@ impl Backing {
         }
     }
 
-    /// True if parts with this support include it. If the support is not specified, the stiffest applies.
+    /// True if parts with this support include it.
     pub const fn is_of(self, support: &Support) -> bool {
         match self {
             Self::CamOnBore => true,
-            Self::HousedRim => !matches!(support.rim, Some(Rim::Free)),
-            Self::FreeRim => matches!(support.rim, Some(Rim::Free)),
-            Self::FingerAtBothEnds => matches!(support.fingers, None | Some(Fingers::HeldAtBothEnds)),
-            Self::FingerAtOneEnd => matches!(support.fingers, Some(Fingers::HeldAtOneEnd)),
-            Self::FingerJoinedAtFarEnd => matches!(support.fingers, Some(Fingers::FarEndsJoined)),
-            Self::FingerOnWeb => matches!(support.fingers, Some(Fingers::WebInTheMiddle)),
+            Self::HousedRim => matches!(support.rim, Rim::Housed),
+            Self::FreeRim => matches!(support.rim, Rim::Free),
+            Self::FingerAtBothEnds => matches!(support.fingers, Fingers::HeldAtBothEnds),
+            Self::FingerAtOneEnd => matches!(support.fingers, Fingers::HeldAtOneEnd),
+            Self::FingerJoinedAtFarEnd => matches!(support.fingers, Fingers::FarEndsJoined),
+            Self::FingerOnWeb => matches!(support.fingers, Fingers::WebInTheMiddle),
         }
     }
 }
@@ -202,7 +204,7 @@ impl Backings {
     ///
     /// let draft = Draft::new(&DriveParameters::default()).unwrap();
     /// let drive = draft.drive().unwrap();
-    /// let support = Support { rim: Some(Rim::Housed), ..Support::default() };
+    /// let support = Support { rim: Rim::Free, ..Support::default() };
     /// let backings = Backings::of(&drive, &draft, &PartsParameters::default(), support);
     /// let mut load = LoadParameters::default();
     /// load.series_compliance_mm_per_n = backings.series_compliance_mm_per_n(&drive, &load);
@@ -241,6 +243,16 @@ impl Backings {
     /// Returns the support of the parts.
     pub const fn support(&self) -> &Support {
         &self.support
+    }
+
+    /// Returns the largest load per length along a tooth over its mean, 1 without fingers.
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the geometry.
+    pub fn load_peak_over_mean(&self, drive: &Drive, p: &LoadParameters) -> Result<f64, NotConverged> {
+        let Some(beam) = self.finger else { return Ok(1.0) };
+        let parameters = FingerParameters { fingers: Some(self.support.fingers), ..FingerParameters::default() };
+        Ok(CarrierFingers::new(drive, beam, parameters, p)?.load_peak_over_mean())
     }
 
     /// Returns the estimates. The deflection within the depth that a contact's law includes belongs to the law.

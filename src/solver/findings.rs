@@ -285,10 +285,8 @@ pub fn of_backing(shares: &Shares) -> Vec<Finding> {
     let soft = shares.shares.iter().filter(|(_, share)| *share > SOFT_BACKING_SHARE);
     let finding = |&(estimate, share): &(Estimate, f64)| {
         let (code, is_grave) = match estimate.backing {
-            Backing::FingerAtOneEnd | Backing::FingerJoinedAtFarEnd | Backing::FingerOnWeb => {
-                (Code::SlenderFingers, true)
-            }
-            Backing::FingerAtBothEnds => (Code::SlenderFingers, false),
+            Backing::FingerAtOneEnd | Backing::FingerOnWeb => (Code::SlenderFingers, true),
+            Backing::FingerAtBothEnds | Backing::FingerJoinedAtFarEnd => (Code::SlenderFingers, false),
             Backing::FreeRim => (Code::SoftRim, true),
             Backing::HousedRim => (Code::SoftRim, false),
             Backing::CamOnBore => return None,

@@ -6,7 +6,7 @@ mod capacity;
 mod overhang;
 mod strength;
 
-pub use beam::{FOOT_IN_DISC, FingerBeam, Fingers};
+pub use beam::{FingerBeam, Fingers, Foot};
 pub use capacity::Limited;
 pub use overhang::{Overhang, slice_compliance_mm2_per_n};
 pub use strength::{LoadCycle, Safety, Strength, stress_concentration};
@@ -20,9 +20,6 @@ use crate::tooth::flat::FlatContact;
 
 /// Radius of the fillet at a finger's foot over the finger's thickness, if it is not given.
 pub const FILLET_SHARE_OF_THICKNESS: f64 = 0.1;
-
-/// Support that is assumed for the strength of fingers, if it is not given: the usual cage.
-pub const ASSUMED_FINGERS: Fingers = Fingers::FarEndsJoined;
 
 /// Factor on the stress concentration if the tooth presses beside the fillet. Measured by finite elements.
 const PRESSED_BESIDE_FILLET: f64 = 1.35;
@@ -132,7 +129,7 @@ impl CarrierFingers {
         parameters: FingerParameters,
         p: &LoadParameters,
     ) -> Result<Self, NotConverged> {
-        let fingers = parameters.fingers.unwrap_or(ASSUMED_FINGERS);
+        let fingers = parameters.fingers.unwrap_or_default();
         let material = &p.materials.carrier;
         let overhang = |beam: &FingerBeam| {
             Ok::<_, NotConverged>(Overhang::of_beam(beam, material, slice_compliance_mm2_per_n(drive, p)?))

@@ -5,7 +5,7 @@ mod measured;
 
 use measured::MEASURED;
 
-use crate::backing::{Backing, Estimate, Rim, Shares, Support};
+use crate::backing::{Backing, Backings, Estimate, Rim, Shares, Support};
 use crate::contact::{Contact, Material};
 use crate::contact_law::{ContactLaw, LawName, WIDE_SHARE};
 use crate::drive::{Drive, ToothShape};
@@ -177,7 +177,7 @@ pub enum Beyond {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
 pub enum HeldCase {
-    /// A rim in a housing, fingers at both ends. Also used if `parts` does not specify it.
+    /// A rim in a housing, fingers that are not slender.
     Housed,
     /// Slender fingers that are not held at one end alone.
     SlenderFingers,
@@ -210,9 +210,9 @@ impl Held {
         let is_soft_finger = |&(estimate, share): &(Estimate, f64)| {
             estimate.backing.contact() == Contact::Carrier && share > SOFT_BACKING_SHARE
         };
-        let case = if support.rim == Some(Rim::Free) && has(Backing::FreeRim).is_some() {
+        let case = if support.rim == Rim::Free && has(Backing::FreeRim).is_some() {
             HeldCase::FreeRim
-        } else if support.fingers == Some(Fingers::HeldAtOneEnd) && has(Backing::FingerAtOneEnd).is_some() {
+        } else if support.fingers == Fingers::HeldAtOneEnd && has(Backing::FingerAtOneEnd).is_some() {
             HeldCase::FingersAtOneEnd
         } else if shares.shares.iter().any(is_soft_finger) {
             HeldCase::SlenderFingers
@@ -331,7 +331,7 @@ pub fn case_of(drive: &Drive, load: &LoadCase, deviations: &Deviations) -> Case 
     Case { has_gaps: load.has_gaps() || !deviations.is_nil(), has_pointed_tips: has_pointed_tips(drive) }
 }
 
-/// Returns the expected model error for this drive, load and sweep, with parts of this support and these shares.
+/// Returns the expected model error for this drive, load and sweep, with these parts and their shares.
 ///
 /// ```
 /// use toothwave_solver::sweep::{Points, sweep};
@@ -352,7 +352,7 @@ pub fn of(
     load: &LoadCase,
     deviations: &Deviations,
     sweep: &Sweep,
-    parts: Option<(&Support, &Shares)>,
+    parts: Option<(&Backings, &Shares)>,
 ) -> Result<ModelError, NotConverged> {
     let p = load.parameters();
     let case = case_of(drive, load, deviations);
@@ -375,7 +375,8 @@ pub fn of(
     // For line contacts the widest is not the one with the largest stress. Flats and the ellipses of balls are known
     // only at their peaks.
     let at_peaks = sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm);
-    let of_lines = widest_half_widths_mm(drive, &sweep.states).map(|(_, half_width_mm)| half_width_mm);
+    let along = parts.map_or(Ok(1.0), |(backings, _)| backings.load_peak_over_mean(drive, p))?;
+    let of_lines = widest_half_widths_mm(drive, &sweep.states, along).map(|(_, half_width_mm)| half_width_mm);
     let widest_mm = at_peaks.chain(of_lines).fold(0.0, f64::max);
     let wind_up_deg = sweep.input_angles.wind_up_deg.iter().copied().fold(0.0, f64::max);
     let is_at_a_point = p.corner_contact && drive.flank_limit().end == FlankEnd::Undercut;
@@ -395,6 +396,6 @@ pub fn of(
         (widest_mm > range.half_width_over_tooth_radius * tooth_radius_mm, Beyond::HalfWidth),
     ];
     let beyond: Vec<_> = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
-    let held = parts.and_then(|(support, shares)| Held::of(support, shares));
+    let held = parts.and_then(|(backings, shares)| Held::of(backings.support(), shares));
     Ok(ModelError { measured, held, range, is_within: beyond.is_empty(), beyond })
 }

@@ -19,7 +19,7 @@ use crate::quantity::{Loaded, OUTER_DIAMETER_MM, Quantity, Takes, Variant};
 /// Reason for a variant without an answer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
 pub struct Reason {
-    /// Code of the field's error, code of the problem if no field is wrong, or `panic`.
+    /// Code of the field's error, code of the problem if no field is wrong, `not_calculated` or `panic`.
     pub code: String,
     /// JSON pointer to the wrong field. For an entry of a list it is the list; without a field it is empty.
     pub pointer: String,
@@ -35,10 +35,21 @@ pub(crate) struct Refusal {
 /// Outcome of a variant.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Outcome {
-    /// The quantities, in the requested order.
+    /// The quantities, in the requested order; NaN for one that this drive does not have.
     Answered(Vec<f64>),
     /// The reason why there are none.
     Refused(Refusal),
+}
+
+impl Outcome {
+    /// Refuses a drive that lacks one of these quantities.
+    pub(crate) fn with_all(self, quantities: &[&'static Quantity]) -> Self {
+        let Self::Answered(values) = &self else { return self };
+        let Some((_, quantity)) = values.iter().zip(quantities).find(|(value, _)| value.is_nan()) else { return self };
+        let reason = Reason { code: "not_calculated".into(), pointer: String::new() };
+        let detail = format!("this drive has no `{}`: {}", quantity.name, quantity.meaning);
+        Self::Refused(Refusal { reason, detail })
+    }
 }
 
 /// The stop flag was set before a variant was computed. The state is the same as before.
@@ -148,7 +159,7 @@ impl Evaluator {
 
     fn values(&self, variant: &Variant<'_>) -> Result<Vec<f64>, NoAnswer> {
         let value = |quantity: &&Quantity| match quantity.of(variant).map_err(SolveError::from) {
-            Ok(value) if value.is_finite() => Ok(value),
+            Ok(value) if value.is_finite() || (value.is_nan() && quantity.may_be_absent) => Ok(value),
             Ok(_) => Err(NoAnswer::internal(format_args!("`{}` is not finite", quantity.name))),
             Err(error) => Err(error.into()),
         };

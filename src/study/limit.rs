@@ -33,8 +33,11 @@ pub enum Bound {
 }
 
 impl Limit {
-    /// Returns the excess of a value as a fraction of the limit; 0 within the limit.
+    /// Returns the excess of a value as a fraction of the limit; 0 within the limit, 1 for an absent value.
     pub(crate) fn violation(&self, value: f64) -> f64 {
+        if value.is_nan() {
+            return 1.0;
+        }
         let beyond = match self.bound {
             Bound::Min => self.limit - value,
             Bound::Max => value - self.limit,

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::io;
 
 use bytes::Bytes;
-use parquet::data_type::{DataType, DoubleType, Int64Type};
+use parquet::data_type::{ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
@@ -140,14 +140,17 @@ fn read_rows(group: &dyn RowGroupReader, quantities: usize, rows: &mut RowsPart)
     let lacks_columns = || PartError::Damaged("it lacks columns".into());
     let first = group.num_columns().checked_sub(quantities + 1).ok_or_else(lacks_columns)?;
     let (variants, _) = column::<Int64Type>(group, 0)?;
+    let (_, is_refused) = column::<ByteArrayType>(group, first + quantities)?;
+    for (variant, &is_refused) in variants.into_iter().zip(&is_refused) {
+        let variant = u64::try_from(variant).map_err(|error| PartError::Damaged(error.to_string()))?;
+        if is_refused { rows.refused.push(variant) } else { rows.answered.push(variant) }
+    }
     for (index, column_of_part) in rows.columns.iter_mut().enumerate() {
         let (values, is_there) = column::<DoubleType>(group, first + index)?;
-        column_of_part.extend(values);
-        if index == 0 {
-            for (&variant, is_answered) in variants.iter().zip(is_there) {
-                let variant = u64::try_from(variant).map_err(|error| PartError::Damaged(error.to_string()))?;
-                if is_answered { rows.answered.push(variant) } else { rows.refused.push(variant) }
-            }
+        let mut values = values.into_iter();
+        for (is_there, _) in is_there.into_iter().zip(&is_refused).filter(|(_, is_refused)| !**is_refused) {
+            let value = if is_there { values.next() } else { None };
+            column_of_part.push(value.unwrap_or(f64::NAN));
         }
     }
     Ok(())

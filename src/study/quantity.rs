@@ -96,6 +96,10 @@ pub struct Quantity {
     #[serde(skip)]
     #[schema(ignore)]
     pub(crate) most: f64,
+    /// True if some drives have no such value.
+    #[serde(skip)]
+    #[schema(ignore)]
+    pub(crate) may_be_absent: bool,
     #[serde(skip)]
     #[schema(ignore)]
     pub(crate) takes: Takes,
@@ -126,6 +130,7 @@ const fn of_drive(name: &'static str, unit: &'static str, meaning: &'static str,
         said_by: None,
         least: f64::NEG_INFINITY,
         most: f64::INFINITY,
+        may_be_absent: false,
         takes: Takes::Drive,
         of,
     }
@@ -186,6 +191,10 @@ impl Quantity {
         Self { least: 0.0, ..self }
     }
 
+    const fn or_absent(self) -> Self {
+        Self { may_be_absent: true, ..self }
+    }
+
     const fn depending_on(self, depends_on: &'static [&'static str]) -> Self {
         Self { depends_on, ..self }
     }
@@ -207,7 +216,7 @@ impl Quantity {
         QUANTITIES.iter().find(|quantity| quantity.name == name)
     }
 
-    /// Computes the value.
+    /// Computes the value, NaN if this drive has none.
     pub(crate) fn of(&self, variant: &Variant<'_>) -> Result<f64, NotConverged> {
         (self.of)(variant)
     }

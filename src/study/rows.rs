@@ -31,7 +31,7 @@ pub(crate) trait Rows {
 pub struct RowsPart {
     /// Variants with quantities.
     pub(crate) answered: Vec<u64>,
-    /// One column for each quantity.
+    /// One column for each quantity; NaN for a drive that does not have it.
     pub(crate) columns: Vec<Vec<f64>>,
     /// Variants without quantities.
     pub(crate) refused: Vec<u64>,
@@ -231,11 +231,11 @@ impl RowsParts<'_> {
         })
     }
 
-    /// Returns the values of a quantity in these variants.
+    /// Returns the values of a quantity in those of these variants that have it.
     pub(crate) fn values(&self, quantity: usize, variants: RangeInclusive<u64>) -> Vec<f64> {
         let mut values = Vec::with_capacity(self.within(variants.clone()).map(|(_, rows)| rows.len()).sum());
         for (part, rows) in self.within(variants) {
-            values.extend_from_slice(&part.columns[quantity][rows]);
+            values.extend(part.columns[quantity][rows].iter().filter(|value| !value.is_nan()));
         }
         values
     }
@@ -326,7 +326,8 @@ impl From<&RefusalNoted> for ReasonAnswer {
 pub struct PossibleAnswer {
     /// Numbers of the variants.
     pub variant: Vec<u64>,
-    /// One column for each quantity, by name.
+    /// One column for each quantity, by name; null for a drive that does not have it.
+    #[schema(value_type = BTreeMap<String, Vec<Option<f64>>>)]
     pub quantities: BTreeMap<&'static str, Vec<f64>>,
 }
 

@@ -253,11 +253,12 @@ impl SensitivityAnswer {
     pub(crate) fn new(sensitivity: &Sensitivity, evaluator: &Evaluator, rows: &RowsPart, is_complete: bool) -> Self {
         let row = |variant: u64| rows.answered.binary_search(&variant).ok();
         let quantities = evaluator.quantities.iter().zip(&rows.columns).filter_map(|(quantity, column)| {
-            let value = *column.get(row(0)?)?;
-            let inputs = (0..).zip(&sensitivity.inputs).map(|(index, input)| {
-                let at = |variant: u64| row(variant).and_then(|row| column.get(row).copied());
-                SensitivityToInput::new(input, value, at(2 * index + 1), at(2 * index + 2))
-            });
+            let at =
+                |variant: u64| row(variant).and_then(|row| column.get(row).copied()).filter(|value| !value.is_nan());
+            let value = at(0)?;
+            let inputs = (0..)
+                .zip(&sensitivity.inputs)
+                .map(|(index, input)| SensitivityToInput::new(input, value, at(2 * index + 1), at(2 * index + 2)));
             let mut inputs: Vec<_> = inputs.collect();
             inputs.sort_by(|one, other| other.change.total_cmp(&one.change));
             Some(SensitivityOfQuantity { quantity: quantity.name, value, inputs })

@@ -94,7 +94,7 @@ impl Column {
 
 impl From<Option<f64>> for Cell {
     fn from(number: Option<f64>) -> Self {
-        number.map_or(Self::Empty, Self::Number)
+        number.filter(|number| !number.is_nan()).map_or(Self::Empty, Self::Number)
     }
 }
 

@@ -84,7 +84,8 @@ async fn cheapest_way_is_fastest_within_requested_error() {
 
 #[tokio::test]
 async fn reports_difference_of_every_model_to_own() {
-    let answer = Service::new().post("/v1/accuracy", &spelled_out()).await.found();
+    let document = with(&spelled_out(), "/parts", json!({ "carrier": { "fingers": "held_at_both_ends" } }));
+    let answer = Service::new().post("/v1/accuracy", &document).await.found();
     let models: std::collections::BTreeSet<_> = ways(&answer)
         .iter()
         .map(|way| (way["compatibility"].as_str().unwrap(), way["law"].as_str().unwrap()))
@@ -116,10 +117,12 @@ async fn omits_model_error_beyond_calculated_drives() {
     let case_5_2: Value = serde_json::from_str(include_str!("../../examples/paper-5.2.json")).unwrap();
     let entering = with(&case_5_2, "/model", json!({}));
     // A smaller width makes its fingers stiff enough.
+    let at_both_ends = json!({ "carrier": { "fingers": "held_at_both_ends" } });
     let narrow = with(&with(&case_5_2, "/drive/teeth/width_mm", json!(5.0)), "/load/input_torque_nm", json!(1.0));
+    let narrow = with(&narrow, "/parts", at_both_ends.clone());
     let pressed = with(&narrow, "/model", json!({ "corner_contact": true }));
     // Fingers held at one end reduce case 5.1's largest force by 13 %.
-    let case_5_1 = with(&spelled_out(), "/model", json!({}));
+    let case_5_1 = with(&with(&spelled_out(), "/model", json!({})), "/parts", at_both_ends);
     let slender = with(&case_5_1, "/parts", json!({ "carrier": { "fingers": "held_at_one_end" } }));
     for (document, expected) in [(entering, None), (pressed, Some(0.04)), (case_5_1, Some(0.01)), (slender, None)] {
         let answer = service.post("/v1/accuracy", &document).await.found();

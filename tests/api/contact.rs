@@ -233,7 +233,8 @@ async fn tolerance_with_too_many_states_is_refused() {
 async fn sweep_reports_model_error_and_its_range() {
     let service = Service::new();
     let told = async |document: &Value| service.post("/v1/sweep", document).await.found()["model_error"].clone();
-    let stiff = told(&shortest()).await;
+    let at_both_ends = json!({ "carrier": { "fingers": "held_at_both_ends" } });
+    let stiff = told(&with(&shortest(), "/parts", at_both_ends)).await;
     assert_eq!((&stiff["is_within"], &stiff["beyond"]), (&json!(true), &json!([])));
     assert_eq!(stiff["measured"]["force"], json!({ "low": -0.01, "high": 0.0 }));
     let case = json!({

@@ -489,11 +489,15 @@ async fn slender_fingers_and_soft_rim_state_estimated_share() {
         let taken = with(&document, "/model", json!({ "series_compliance_mm_per_n": series }));
         assert!(!codes_of(&findings(&taken).await).contains(&code.to_owned()));
     }
-    // With both ends held, the fingers of case 5.2 are still slender and those of case 5.1 are not.
-    assert_eq!(finding(&undercut(), "slender_fingers").await["severity"], "info");
-    for parts in [json!({}), json!({ "carrier": { "fingers": "held_at_both_ends" }, "ring": { "rim": "housed" } })] {
-        assert!(findings(&held(parts)).await.is_empty());
-    }
+    // If nothing is said, far ends are joined: such a cage is slender, fingers held at both ends are not.
+    let both = json!({ "carrier": { "fingers": "held_at_both_ends" }, "ring": { "rim": "housed" } });
+    assert!(findings(&held(both)).await.is_empty());
+    let assumed = finding(&held(json!({})), "slender_fingers").await;
+    assert_eq!(
+        assumed,
+        finding(&held(json!({ "carrier": { "fingers": "far_ends_joined" } })), "slender_fingers").await
+    );
+    assert_eq!(assumed["severity"], "info");
 }
 
 #[tokio::test]

@@ -240,15 +240,16 @@ test('peaks state their model error', async () => {
   assert.deepEqual(await told(), ['The model’s own error: force +1 to +8 %, stress −1 to +5 %; not measured with other sizes and loads under its law.', '', '', estimated]);
   const { model, ...unnamed } = await designOf(page);
   assert.ok(model);
-  await setDocument(page, { ...unnamed, sweep: { wind_up: true } });
+  const carrier = { fingers: 'held_at_both_ends' };
+  await setDocument(page, { ...unnamed, parts: { carrier }, sweep: { wind_up: true } });
   assert.deepEqual(await told(), [
     'The model’s own error: force −1 to 0 %, stress −2 to +1 %.',
     '',
     'The model’s own error: wind-up −2 to −1 % where bodies are held at the law’s depth. ' +
-      'Besides, for a housed rim and fingers held at both ends: by the estimates −12 %, −25 to −20 % in earlier calculations of elastic bodies.',
+      'Besides, for a housed rim and stiff fingers: by the estimates −13 %, −25 to −20 % in earlier calculations of elastic bodies.',
     estimated,
   ]);
-  await setDocument(page, { ...unnamed, parts: { ring: { clearance_um: 20 } } });
+  await setDocument(page, { ...unnamed, parts: { carrier, ring: { clearance_um: 20 } } });
   assert.match((await told())[0], /; not measured with larger clearances, a larger wind-up\.$/);
   await pick(page, LAW, 'fixed');
   assert.equal((await told())[0], 'The model’s own error: not measured under this law.');

@@ -277,7 +277,9 @@ test('smallest drive has no findings and all drawings', async () => {
   const { geometry, sweep } = await bed.server.answers(design);
   assert.deepEqual([...geometry.findings, ...sweep.findings].map(({ code }) => code), []);
   assert.ok(geometry.carrier.radial_space_mm >= 3);
-  assert.ok(sweep.series_compliance_estimates.find(({ backing }) => backing === 'finger_at_both_ends').share <= 0.2);
+  const held = sweep.series_compliance_estimates.find(({ contact, is_as_held: isAsHeld }) => contact === 'carrier' && isAsHeld);
+  assert.deepEqual([sweep.fingers.fingers, held.backing, design.model.series_compliance_mm_per_n], ['far_ends_joined', 'finger_joined_at_far_end', 'estimated']);
+  assert.ok(sweep.fingers.safety >= 1.5 * (1 - 1e-6));
   assert.ok(sweep.torque_capacity.output_torque_nm >= 200);
   for (const part of ['assembly', 'ring', 'wave-generator', 'carrier', 'tooth']) {
     // One file for each part, since Chromium drops downloads beyond ten a second.

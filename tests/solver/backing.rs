@@ -8,7 +8,7 @@ use toothwave_solver::Compatibility::VirtualWork;
 use toothwave_solver::backing::{Backing, Backings, Estimate, HeldStrip, Rim, RimStrip, Shares, Support};
 use toothwave_solver::drive::Draft;
 use toothwave_solver::findings;
-use toothwave_solver::fingers::{FOOT_IN_DISC, FingerBeam, Fingers};
+use toothwave_solver::fingers::{FingerBeam, Fingers, Foot};
 use toothwave_solver::model_error::{self, Beyond, Held, HeldCase};
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::{
@@ -79,8 +79,9 @@ fn share(shares: &Shares, wanted: Backing) -> f64 {
     shares.shares.iter().find(|(estimate, _)| estimate.backing == wanted).unwrap().1
 }
 
-const AT_ONE_END: Support = Support { fingers: Some(Fingers::HeldAtOneEnd), rim: None };
-const FREE: Support = Support { fingers: None, rim: Some(Rim::Free) };
+const AT_ONE_END: Support = Support { fingers: Fingers::HeldAtOneEnd, rim: Rim::Housed };
+const AT_BOTH_ENDS: Support = Support { fingers: Fingers::HeldAtBothEnds, rim: Rim::Housed };
+const FREE: Support = Support { fingers: Fingers::HeldAtBothEnds, rim: Rim::Free };
 
 #[test]
 fn finger_compliance_matches_finite_elements() {
@@ -88,7 +89,7 @@ fn finger_compliance_matches_finite_elements() {
         let Finger { length_mm, thickness_mm, height_mm, at_both_ends, compliance_mm_per_n } = finger;
         let held = if at_both_ends { Fingers::HeldAtBothEnds } else { Fingers::HeldAtOneEnd };
         // Held in rigid discs, and pressed square to their sides.
-        let beam = FingerBeam { length_mm, thickness_mm, height_mm, count: i64::MAX, foot: 0.0 };
+        let beam = FingerBeam { length_mm, thickness_mm, height_mm, count: i64::MAX, foot: Foot::RIGID };
         let found = beam.compliance_mm_per_n(&Material::STEEL, held);
         assert!(
             (found / compliance_mm_per_n - 1.0).abs() < if at_both_ends { 0.05 } else { 0.01 },
@@ -151,7 +152,7 @@ fn finger_thickness_is_wall_distance_at_mid_height() {
         thickness_mm: 124.0 * (PI / 28.0).sin() - 10.0,
         height_mm: 6.4,
         count: 28,
-        foot: FOOT_IN_DISC,
+        foot: Foot::IN_DISC,
     };
     let expected = beam.compliance_mm_per_n(&Material::STEEL, Fingers::HeldAtOneEnd);
     assert!((found.compliance_mm_per_n / expected - 1.0).abs() < 1e-12, "{} {expected}", found.compliance_mm_per_n);
@@ -220,17 +221,19 @@ fn only_soft_parts_are_findings() {
     let found = |parameters: &DriveParameters, load: &LoadParameters, support| {
         shares(parameters, load, support).map(|shares| findings::of_backing(&shares))
     };
-    assert_eq!(found(&PAPER_5_1, &johnson(20.0), Support::default()), Some(Vec::new()));
+    assert_eq!(found(&PAPER_5_1, &johnson(20.0), AT_BOTH_ENDS), Some(Vec::new()));
+    let joined = found(&PAPER_5_1, &johnson(20.0), Support::default()).unwrap();
     let one_end = found(&PAPER_5_1, &johnson(20.0), AT_ONE_END).unwrap();
     let told = |found: &[Finding], wanted: (FindingCode, Severity), least: f64, most: f64| {
         let [Finding { code, severity, value, .. }] = *found else { panic!("{found:?}") };
         assert!((code, severity) == wanted && (least..most).contains(&value), "{found:?}");
     };
+    told(&joined, (FindingCode::SlenderFingers, Severity::Info), 0.2, 0.5);
     told(&one_end, (FindingCode::SlenderFingers, Severity::Warning), 1.0, f64::INFINITY);
     let free = found(&PAPER_5_1, &johnson(20.0), FREE).unwrap();
     told(&free, (FindingCode::SoftRim, Severity::Warning), 10.0, f64::INFINITY);
     // Those of case 5.2 are a millimetre and a half high: slender however they are held.
-    let low = found(&PAPER_5_2, &johnson(3.0), Support::default()).unwrap();
+    let low = found(&PAPER_5_2, &johnson(3.0), AT_BOTH_ENDS).unwrap();
     told(&low, (FindingCode::SlenderFingers, Severity::Info), 0.2, 1.0);
     // Under other laws wind-up is further off by itself.
     let fixed = ContactLaw::Fixed(PerContact { wave_generator: 4e5, ring: 4e5, carrier: 4e5 });
@@ -245,11 +248,13 @@ fn model_error_reports_how_parts_are_held() {
         let sweep = swept(parameters, &load, 50);
         let shares = shares(parameters, &load, support);
         let case = LoadCase::new(&load).unwrap();
-        let parts = shares.as_ref().map(|shares| (&support, shares));
+        let backings = backings(parameters, &PartsParameters::default(), support);
+        let parts = shares.as_ref().map(|shares| (&backings, shares));
         model_error::of(&drive(parameters), &case, &Deviations::default(), &sweep, parts).unwrap()
     };
     for (parameters, torque_nm, support, case, is_soft) in [
-        (PAPER_5_1, 20.0, Support::default(), HeldCase::Housed, false),
+        (PAPER_5_1, 20.0, AT_BOTH_ENDS, HeldCase::Housed, false),
+        (PAPER_5_1, 20.0, Support::default(), HeldCase::SlenderFingers, true),
         (PAPER_5_1, 20.0, AT_ONE_END, HeldCase::FingersAtOneEnd, true),
         (PAPER_5_1, 20.0, FREE, HeldCase::FreeRim, true),
         (PAPER_5_2, 3.0, Support::default(), HeldCase::SlenderFingers, true),
@@ -267,7 +272,7 @@ fn model_error_reports_how_parts_are_held() {
 
 #[test]
 fn errors_of_backings_add_like_series_springs() {
-    let both = Support { fingers: Some(Fingers::HeldAtOneEnd), rim: Some(Rim::Free) };
+    let both = Support { fingers: Fingers::HeldAtOneEnd, rim: Rim::Free };
     let shares = shares(&PAPER_5_1, &johnson(20.0), both).unwrap();
     let sum = share(&shares, Backing::FreeRim) + share(&shares, Backing::FingerAtOneEnd);
     assert!((1.0 / (1.0 + sum) - 1.0 - shares.wind_up_error()).abs() < 1e-12);

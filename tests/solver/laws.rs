@@ -332,7 +332,7 @@ fn contact_above_tenth_of_tooth_is_a_finding() {
     let found = |load: &LoadParameters| {
         let drive = drive(&PAPER_5_1);
         let sweep = swept(&PAPER_5_1, load, 10);
-        findings::of_half_widths(&drive, &LoadCase::new(load).unwrap(), &sweep.states)
+        findings::of_half_widths(&drive, &LoadCase::new(load).unwrap(), &sweep.states, 1.0)
     };
     assert_eq!(found(&johnson(20.0)), []);
     assert_eq!(found(&load(2e3, VirtualWork)), []);
@@ -345,6 +345,11 @@ fn contact_above_tenth_of_tooth_is_a_finding() {
         })
         .collect();
     assert!(widths.contains(&(Some(Contact::Ring), 0.5)), "{heavy:?}");
+    // At the most loaded place along the teeth contacts are wider by the root of the load.
+    let sweep = swept(&PAPER_5_1, &johnson(2000.0), 10);
+    let case = LoadCase::new(&johnson(2000.0)).unwrap();
+    let uneven = findings::of_half_widths(&drive(&PAPER_5_1), &case, &sweep.states, 2.25);
+    assert!(uneven.iter().zip(&heavy).all(|(wide, mean)| (wide.value / mean.value - 1.5).abs() < 1e-12), "{uneven:?}");
     let shallow = LoadParameters {
         law: ContactLaw::Johnson { depth_mm: PerContact { wave_generator: None, ring: None, carrier: Some(0.3) } },
         ..johnson(20.0)

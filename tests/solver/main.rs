@@ -10,6 +10,7 @@ mod drives;
 mod extremes;
 mod family;
 mod fast;
+mod finger_strength;
 mod fingers;
 mod finite_elements;
 mod gaps;

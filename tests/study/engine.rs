@@ -38,9 +38,9 @@ fn in_chunks_of(document: &Value, variants: u64) -> Arc<Study> {
     Arc::new(Study::read(document.to_string().as_bytes(), &LIMITS).unwrap().in_chunks_of(variants))
 }
 
-/// Returns a part after a round trip through the store.
-fn kept(part: &Part) -> Part {
-    serde_json::from_str(&serde_json::to_string(part).unwrap()).unwrap()
+/// Returns a part after a round trip through its file.
+fn kept(study: &Study, chunk: u64, part: &Part) -> Part {
+    study.read_part(chunk, study.part_bytes(chunk, part).unwrap()).unwrap()
 }
 
 #[test]
@@ -53,7 +53,7 @@ fn chunks_in_any_order_give_same_bits() {
         pool.install(|| {
             let chunks: Vec<_> = (0..study.chunks()).rev().collect();
             chunks.into_par_iter().for_each(|chunk| {
-                let part = kept(&Work::new(&study, chunk).run(&Never).unwrap());
+                let part = kept(&study, chunk, &Work::new(&study, chunk).run(&Never).unwrap());
                 several.lock().unwrap().add(chunk, part.clone());
                 // Adding a part twice changes nothing.
                 several.lock().unwrap().add(chunk, part);
@@ -95,7 +95,8 @@ fn resumed_chunk_has_same_bits() {
                 Err(_) => stopped += 1,
             }
         }
-        assert_eq!(work.finish(), whole, "{}", study.kind());
+        // As text, since an absent value is not equal to itself.
+        assert_eq!(format!("{:?}", work.finish()), format!("{whole:?}"), "{}", study.kind());
         assert!(stopped > 0 || study.kind() == "search", "{}", study.kind());
     }
 }

@@ -390,9 +390,23 @@ fn finger_compliance_matches_estimate_of_sweep() {
         shares.push(share);
     }
     assert!(shares[0] > 0.0 && shares[1] > 10.0 * shares[0], "{shares:?}");
-    // The linear law has an error as large and so no estimate.
-    let linear = answer(&map(over, json!(["carrier_finger_share"])));
-    assert_eq!(numbers(&linear["possible"]["quantities"]["carrier_finger_share"]), [0.0]);
+}
+
+#[test]
+fn quantity_that_drive_lacks_is_null() {
+    // The linear law has an error as large as a finger's share, and so no estimate.
+    let over = json!({ "/load/input_torque_nm": { "one_of": [20.0] } });
+    let linear = map(over.clone(), json!(["carrier_finger_share", "finger_stress_mpa", "peak_stress_mpa"]));
+    let values = |study: &Value| {
+        let quantities = answer(study)["possible"]["quantities"].clone();
+        ["carrier_finger_share", "finger_stress_mpa", "peak_stress_mpa"].map(|name| quantities[name][0].is_number())
+    };
+    assert_eq!(values(&linear), [false, true, true]);
+    let balls = json!({ "shape": "ball", "count": 28, "radius_mm": 5.0 });
+    let balls = with(&with(&linear, "/base/drive/teeth", balls), "/base/model", json!({}));
+    assert_eq!(values(&balls), [false, false, true]);
+    let csv = text(&gathered(&balls), Format::Csv);
+    assert!(csv.lines().nth(1).unwrap().starts_with("0,20.0,,,"), "{csv}");
 }
 
 #[test]

@@ -636,6 +636,12 @@ fn strength_of_carrier_limits_safety_of_fingers() {
     assert_ne!(id(&search), id(&limit(0.0)));
     let safety = number(&answer(&search)["front"][0]["quantities"]["finger_safety"]);
     assert!(safety >= 1.5, "{safety}");
+    // Balls have no fingers, so they are no answer.
+    let kinds = json!({ "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0 } });
+    let balls = with(&base, "/drive/teeth", json!({ "shape": "ball", "count": 28 }));
+    let balls = with(&with(&of_fingers(with(&balls, "/model", json!({}))), "/free", kinds), "/evaluations", json!(100));
+    let found = answer(&balls);
+    assert_eq!((&found["front"], &found["scan"]["reasons"][0]["code"]), (&json!([]), &json!("not_calculated")));
     // Without a strength there is no safety.
     assert_eq!(faulty(&of_fingers(paper())), ("/base/parts/carrier/strength".into(), "missing_field".into()));
 }

@@ -79,7 +79,7 @@ pub struct PartsDocument {
 }
 
 impl PartsDocument {
-    /// Removes a support that is the default. Fingers have none: left out, compliance and strength assume different ones.
+    /// Removes a support that is the default. That of fingers stays, since answers say whether it is assumed.
     pub(super) fn leave_out_default_supports(&mut self) {
         self.ring.rim.take_if(|rim| *rim == Rim::Housed);
     }
@@ -135,7 +135,7 @@ pub struct RingPartDocument {
     /// Outward offset of the flank, in µm. A bored tip keeps its radius. Default: 0 µm.
     pub clearance_um: f64,
     /// Support of the ring's rim. A sweep estimates the compliance from it; drawings do not use it. Default: a rigid
-    /// housing, assumed by the findings.
+    /// housing.
     #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub rim: Option<Rim>,
@@ -159,7 +159,7 @@ pub struct CarrierPartDocument {
     pub clearance_um: f64,
     /// Support of the fingers between the slots. A sweep calculates compliance and strength from it. If they are held at
     /// one end or in the middle, contact stresses are those at the place where the load along a tooth is largest.
-    /// Left out: the compliance is that of fingers held at both ends, the strength that of joined far ends, and the load along a tooth is even.
+    /// Default: a disc at one end, and a ring that joins the far ends.
     #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub fingers: Option<Fingers>,

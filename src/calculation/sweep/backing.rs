@@ -18,7 +18,7 @@ pub struct EstimateAnswer {
     pub backing: Backing,
     /// Additional displacement of the contact per newton, beyond the depth that the contact's law includes.
     pub compliance_mm_per_n: f64,
-    /// True if this support is the one in `parts`. If `parts` does not specify it, the stiffest applies.
+    /// True if this support is the one in `parts`, or the default if `parts` does not specify it.
     pub is_as_held: bool,
     /// Share that it adds to the approach of a tooth at its three contacts, for cylinders with this support under
     /// `johnson`. Left out if the design gives a series compliance there.

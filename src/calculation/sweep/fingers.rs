@@ -99,6 +99,11 @@ impl CheckedSweep {
         self.fingers.as_ref().map(|fingers| fingers.stress(peaks.carrier.force_n.value, output_torque_nm))
     }
 
+    /// Returns the largest load per length along a tooth over its mean.
+    pub(super) fn load_peak_over_mean(&self) -> f64 {
+        self.fingers.as_ref().map_or(1.0, CarrierFingers::load_peak_over_mean)
+    }
+
     /// Returns the summary of a sweep with the stresses at the most loaded place along the teeth.
     pub fn summary_along(&self, peaks: SweepPeaks) -> SweepPeaks {
         match &self.fingers {

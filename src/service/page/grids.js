@@ -7,7 +7,7 @@ function gridOf({ variants, over, possible, impossible, reasons, is_complete: is
     Object.entries(possible.quantities).map(([name, column]) => {
       const values = new Float64Array(variants).fill(NaN);
       possible.variant.forEach((variant, row) => {
-        values[variant] = column[row];
+        values[variant] = column[row] ?? NaN;
       });
       return [name, values];
     }),

@@ -21,8 +21,6 @@ const RIM = 1.2;
 
 /** Below this share of a slot's width a finding warns of the wall between slots; steeper flanks than this angle it warns of too. */
 const LEAST_WALL = 0.25;
-/** A finding speaks of fingers that give way by more than this share of what a tooth does at its contacts. */
-const SOFTEST_FINGER = 0.2;
 /** Against yield and fatigue of the fingers under a typical strength of the material. */
 const LEAST_SAFETY = 1.5;
 /** A rule of thumb: lower carriers are sheets. */
@@ -61,7 +59,8 @@ const WAVE_GENERATORS = [
   },
 ];
 
-const JOHNSON = { compatibility: 'virtual_work', stiffness: { law: 'johnson' } };
+/** Fingers bend as they are held where their strength is calculated, and rims as they are housed. */
+const JOHNSON = { compatibility: 'virtual_work', stiffness: { law: 'johnson' }, series_compliance_mm_per_n: 'estimated' };
 
 const SHAPES = [
   { name: 'cylinder', model: JOHNSON, free: (tooth, width) => ({ width_mm: [0.08 * width, width] }) },
@@ -90,7 +89,6 @@ export const FIRST = {
     allowable_stress_mpa: 1500,
     wall: LEAST_WALL,
     carrier_space_mm: LEAST_CARRIER_MM,
-    fingers: SOFTEST_FINGER,
     carrier_strength: '42crmo4-qt',
     finger_safety: LEAST_SAFETY,
     friction: 0.05,
@@ -138,7 +136,6 @@ export const GROUPS = [
       flag('undercut'),
       number('wall', '', '', { optional: () => t('empty.not_asked'), step: 0.05 }),
       number('carrier_space_mm', '', 'mm', { optional: () => t('empty.not_asked'), step: 0.5 }),
-      number('fingers', '', '', { optional: () => t('empty.not_asked'), step: 0.05 }),
       number('efficiency', 'η', '', { optional: () => t('empty.not_asked'), step: 0.01 }),
       number('friction', 'μ', '', { likely: 0.05, step: 0.01 }),
       flag('rounded'),
@@ -176,7 +173,6 @@ const FIELDS = {
   undercut: 'undercut',
   slot_wall_over_slot_width: 'wall',
   carrier_radial_space_mm: 'carrier_space_mm',
-  carrier_finger_share: 'fingers',
   finger_safety: 'finger_safety',
   efficiency_ring_fixed: 'efficiency',
   peak_stress_wave_generator_mpa: 'allowable_wave_generator_mpa',
@@ -196,7 +192,7 @@ function required(requirements, shape) {
     const allowable = asked(requirements, `allowable_${key}_mpa`);
     return allowable === undefined ? [] : [[`peak_stress_${key}_mpa`, { max: allowable }]];
   });
-  const [wall, efficiency, width, space, fingers, safety] = ['wall', 'efficiency', 'width_mm', 'carrier_space_mm', 'fingers', 'finger_safety'].map((name) => asked(requirements, name));
+  const [wall, efficiency, width, space, safety] = ['wall', 'efficiency', 'width_mm', 'carrier_space_mm', 'finger_safety'].map((name) => asked(requirements, name));
   return {
     outer_diameter_mm: { max: asked(requirements, 'outer_diameter_mm') },
     torque_capacity_output_nm: { min: asked(requirements, 'output_torque_nm') },
@@ -204,8 +200,6 @@ function required(requirements, shape) {
     ...(asked(requirements, 'undercut') ? {} : { undercut: false }),
     ...(wall === undefined ? {} : { slot_wall_over_slot_width: { min: wall } }),
     ...(space === undefined ? {} : { carrier_radial_space_mm: { min: space } }),
-    // Of other teeth no estimate tells.
-    ...(fingers === undefined || shape.name !== 'cylinder' ? {} : { carrier_finger_share: { max: fingers } }),
     ...(safety === undefined || shape.name === 'ball' ? {} : { finger_safety: { min: safety } }),
     ...(efficiency === undefined ? {} : { efficiency_ring_fixed: { min: efficiency } }),
     ...Object.fromEntries(stresses),

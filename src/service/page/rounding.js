@@ -28,7 +28,7 @@ export function roundingOf({ design, quantities, question }) {
 }
 
 const keeps = (require, quantities) =>
-  Object.entries(require).every(([name, limit]) => (typeof limit === 'boolean' ? Boolean(quantities[name]) === limit : !(quantities[name] < limit.min) && !(quantities[name] > limit.max)));
+  Object.entries(require).every(([name, limit]) => (typeof limit === 'boolean' ? Boolean(quantities[name]) === limit : (limit.min === undefined || quantities[name] >= limit.min) && (limit.max === undefined || quantities[name] <= limit.max)));
 
 /** The best of the neighbours that keep every limit, as a found drive; nothing where none does. */
 export function bestRounded(found, { axes, variants, reason, quantities: columns }, goals) {

@@ -114,7 +114,6 @@ export const FIELDS = {
     '/find/undercut': 'Undercut ring tips are allowed',
     '/find/wall': 'Wall between slots, over their width',
     '/find/carrier_space_mm': 'Height of the carrier between wave generator and ring',
-    '/find/fingers': 'Greatest finger deflection over contact deflection',
     '/find/efficiency': 'Least efficiency',
     '/find/friction': 'Coefficient of friction',
     '/find/rounded': 'Round lengths to 0.01 mm',
@@ -211,7 +210,7 @@ export const FIELDS = {
     '/parts': 'Drawings, the strength of the carrier’s fingers and the estimated compliance of the supports depend on these. Forces on flat-sided teeth depend on the carrier’s radii too.',
     carrier: 'By default a tenth of the annulus between cam and ring tips stays free on either side.',
     '/find/bears': 'A Hertz stress, without a factor of safety. Bearing steel and case-hardened steel bear 1500 MPa (ISO 281, ISO 6336-5), alloy steel of 300 HV about 770 MPa. Fingers of the carrier have a disc at one end and a ring that joins their far ends.',
-    '/find/build': 'Teeth never touch each other, stay inside the carrier and meet flanks that are not too steep. The finger deflection is estimated for cylinders, held at both ends.',
+    '/find/build': 'Teeth never touch each other, stay inside the carrier and meet flanks that are not too steep. Forces include the estimated compliance of fingers and rim.',
     '/find/goals': 'One to four. With several goals there is no single best drive: the search shows the best trade-offs.',
   },
   /** What stands in an empty field. */

@@ -130,7 +130,7 @@ export const RESULTS = {
     held_as: 'Besides, for {case}: by the estimates {estimated} %.',
     held_as_earlier: 'Besides, for {case}: by the estimates {estimated} %, {earlier} in earlier calculations of elastic bodies.',
     held: {
-      housed: 'a housed rim and fingers held at both ends',
+      housed: 'a housed rim and stiff fingers',
       slender_fingers: 'slender fingers',
       fingers_at_one_end: 'fingers held at one end',
       free_rim: 'a rim with nothing around it',

@@ -129,7 +129,7 @@ export const RESULTS = {
     held_as: '此外，{case}：估算增加 {estimated} %。',
     held_as_earlier: '此外，{case}：估算增加 {estimated} %，先前的弹性体计算为 {earlier}。',
     held: {
-      housed: '轮缘装在壳体内、指两端支承时',
+      housed: '轮缘装在壳体内、指不细长时',
       slender_fingers: '指细长时',
       fingers_at_one_end: '指一端支承时',
       free_rim: '轮缘无支承时',

@@ -84,23 +84,27 @@ pub fn of_contacts(
     findings
 }
 
-/// Returns half the width of the widest contact of each kind over all states. It is not the contact with the largest
-/// stress. Flats have none.
-pub(crate) fn widest_half_widths_mm(drive: &Drive, states: &States) -> impl Iterator<Item = (Contact, f64)> {
+/// Returns half the width of the widest contact of each kind over all states, at the most loaded place along the teeth.
+/// It is not the contact with the largest stress. Flats have none.
+pub(crate) fn widest_half_widths_mm(
+    drive: &Drive,
+    states: &States,
+    load_peak_over_mean: f64,
+) -> impl Iterator<Item = (Contact, f64)> {
     let tooth_width_mm = drive.tooth_width_mm();
     states.force_n.iter().filter(|&(contact, _)| !is_flat(drive, contact)).map(move |(contact, forces_n)| {
         // A corner has no such width, and its stress is not reported.
         let loaded = forces_n.iter().zip(states.stress_mpa.get(contact)).filter(|&(_, &stress_mpa)| stress_mpa > 0.0);
         let half_widths = loaded.map(|(&force_n, &stress_mpa)| half_width_mm(force_n, stress_mpa, tooth_width_mm));
-        (contact, half_widths.fold(0.0, f64::max))
+        (contact, load_peak_over_mean.sqrt() * half_widths.fold(0.0, f64::max))
     })
 }
 
-/// Returns the contacts that are too wide for Johnson's law, over all states.
-pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States) -> Vec<Finding> {
+/// Returns the contacts that are too wide for Johnson's law, over all states, whose stresses are means along the teeth.
+pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States, load_peak_over_mean: f64) -> Vec<Finding> {
     let length_mm = load.parameters().law.reference_length_mm(drive.parameters().tooth_radius_mm);
     let Some(length_mm) = length_mm else { return Vec::new() };
-    widest_half_widths_mm(drive, states)
+    widest_half_widths_mm(drive, states, load_peak_over_mean)
         .map(|(contact, half_width_mm)| {
             let limit_mm = WIDE_SHARE * length_mm.get(contact);
             Finding::warning(Code::JohnsonBeyondHalfWidth, half_width_mm, limit_mm).at(contact)

@@ -353,29 +353,32 @@ pub static QUANTITIES: [Quantity; 61] = [
     of_sweep(
         "carrier_finger_share",
         "",
-        "Deflection of a carrier finger over the deflection of a tooth at its contacts. 0 without an estimate. Above 0.2 there is a finding.",
-        Source::Definition("the `share` of the finger with its support (both ends if not given) among `/series_compliance_estimates` of the sweep, 0 if it is absent"),
-        |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.mean_peaks).unwrap_or(0.0))),
+        "Deflection of a carrier finger over the deflection of a tooth at its contacts, for cylinders by `johnson` without a series compliance at the carrier. Above 0.2 there is a finding.",
+        Source::Definition("the `share` of the finger with its support among `/series_compliance_estimates` of the sweep"),
+        |variant| Ok(variant.loaded(|loaded| loaded.checked.finger_share(&loaded.mean_peaks).unwrap_or(f64::NAN))),
     )
-    .not_below_zero(),
+    .not_below_zero()
+    .or_absent(),
     of_sweep(
         "finger_stress_mpa",
         "MPa",
-        "Largest bending stress at the foot of a carrier finger. 0 without a calculation, as for balls.",
+        "Largest bending stress at the foot of a carrier finger. Balls have none.",
         sweep("/fingers/stress_mpa"),
         |variant| Ok(variant.fingers(|stress| Some(stress.largest_mpa))),
     )
-    .not_below_zero(),
+    .not_below_zero()
+    .or_absent(),
     Quantity {
         needs: Needs::CarrierStrength,
         ..of_sweep(
             "finger_safety",
             "",
-            "Safety of the carrier fingers against yield and fatigue. Below 1 there is a finding. 0 without a calculation, as for balls.",
+            "Safety of the carrier fingers against yield and fatigue. Below 1 there is a finding. Balls have none.",
             sweep("/fingers/safety"),
             |variant| Ok(variant.fingers(|stress| stress.safety.map(|safety| safety.least()))),
         )
         .not_below_zero()
+        .or_absent()
     },
     of_capacity(
         "torque_capacity_input_nm",

@@ -59,9 +59,11 @@ impl Variant<'_> {
         })
     }
 
-    /// Returns a value of the carrier's fingers, 0 if they are not calculated.
+    /// Returns a value of the carrier's fingers, NaN if they are not calculated.
     pub(super) fn fingers(&self, of: impl Fn(&FingerStress) -> Option<f64>) -> f64 {
-        self.loaded(|loaded| loaded.checked.finger_stress(&loaded.mean_peaks).as_ref().and_then(&of).unwrap_or(0.0))
+        self.loaded(|loaded| {
+            loaded.checked.finger_stress(&loaded.mean_peaks).as_ref().and_then(&of).unwrap_or(f64::NAN)
+        })
     }
 
     pub(super) fn losses(&self, of: impl Fn(&LossTotals) -> f64) -> f64 {

@@ -108,7 +108,7 @@ impl Island {
         };
         let values: Vec<Value> = variable_values(&self.template, &place);
         let outcome = match evaluator.outcome(self.template.filled(&values), stop) {
-            Ok(outcome) => outcome,
+            Ok(outcome) => outcome.with_all(&evaluator.quantities),
             Err(interrupted) => {
                 self.pending = Some((place, is_scanning));
                 return Err(interrupted);

@@ -156,9 +156,11 @@ impl ToleranceAnswer {
             failed: sampled().filter(|&(part, row)| fails(limit, part, row)).count() as u64,
         });
         let alone = tolerance.alone();
-        let quantities = evaluator.quantities.iter().enumerate().filter(|_| answered > 0);
-        let quantities = quantities.map(|(column, quantity)| {
+        let quantities = evaluator.quantities.iter().enumerate().filter_map(|(column, quantity)| {
             let mut sorted = rows.values(column, samples.clone());
+            if sorted.is_empty() {
+                return None;
+            }
             let Spread { mean, standard_deviation } = spread(&sorted);
             // An unstable sort gives the same result, because equal values have equal bits.
             sorted.sort_unstable_by(f64::total_cmp);
@@ -173,7 +175,7 @@ impl ToleranceAnswer {
                 kind.share = if variance > 0.0 { kind.standard_deviation.powi(2) / variance } else { 0.0 };
             }
             contributors.sort_by(|one, other| other.standard_deviation.total_cmp(&one.standard_deviation));
-            ToleranceQuantityAnswer {
+            Some(ToleranceQuantityAnswer {
                 quantity: quantity.name,
                 nominal: rows.values(column, 0..=0).first().copied(),
                 mean,
@@ -183,7 +185,7 @@ impl ToleranceAnswer {
                 quantiles: SHARES.iter().filter_map(|&share| quantile(&sorted, share)).collect(),
                 histogram: HistogramAnswer::of(&sorted),
                 contributors,
-            }
+            })
         });
         Self {
             solver_version: toothwave_solver::VERSION,
