@@ -237,15 +237,15 @@ test('peaks state their model error', async () => {
   const told = () => page.$$eval('#table .told', (lines) => lines.map((line) => line.textContent));
   // The paper's model, whose forces are too large, without wind-up.
   const estimated = 'Estimated from the parts as they are made. Forces leave it out until you take it over.';
-  assert.deepEqual(await told(), ['The model’s own error: force +1 to +8 %, stress −1 to +5 %. It was not measured for other sizes and loads under its law.', '', '', estimated]);
+  assert.deepEqual(await told(), ['The model’s own error: force +1 to +8\u202f%, stress −1 to +5\u202f%. It was not measured for other sizes and loads under its law.', '', '', estimated]);
   const { model, ...unnamed } = await designOf(page);
   assert.ok(model);
   await setDocument(page, { ...unnamed, sweep: { wind_up: true } });
   assert.deepEqual(await told(), [
-    'The model’s own error: force −1 to 0 %, stress −2 to +1 %.',
+    'The model’s own error: force −1 to 0\u202f%, stress −2 to +1\u202f%.',
     '',
-    'The model’s own error: wind-up −2 to −1 %, with bodies that are rigid below the depth of the contact law. ' +
-      'Besides, for a housed rim and fingers held at both ends: by the estimates −12 %, −25 to −20 % in earlier calculations of elastic bodies.',
+    'The model’s own error: wind-up −2 to −1\u202f%, with bodies that are rigid below the depth of the contact law. ' +
+      'Besides, for a housed rim and fingers held at both ends: by the estimates −12 %, −25 to −20\u202f% in earlier calculations of elastic bodies.',
     estimated,
   ]);
   await setDocument(page, { ...unnamed, parts: { ring: { clearance_um: 20 } } });

@@ -101,7 +101,7 @@ test('every example loads with the service’s numbers', async () => {
 test('numbers are rounded only for display', async () => {
   page = await open(browser, server);
   assert.match(await page.textContent('#key-figures'), /Largest force1549\.3.Nring, ψ 43\.7°/);
-  assert.match(await page.textContent('#key-figures'), /Undercutnocritical r 6\.749 mm/);
+  assert.match(await page.textContent('#key-figures'), /Undercutnocritical r 6\.749.mm/);
 });
 
 test('dragged slider answers live, one step to undo', async () => {
@@ -197,7 +197,7 @@ test('case 5.1 with larger r shows undercut', async () => {
   assert.match(explanation, /What is tested.*critical radius.*6\.8.mm, the limit is 6\.7492.mm/);
   assert.match(explanation, /Why it matters.*cut away/);
   assert.match(explanation, /What to change.*thinner/);
-  assert.match(await page.textContent('#key-figures'), /Undercutyescritical r 6\.749 mm/);
+  assert.match(await page.textContent('#key-figures'), /Undercutyescritical r 6\.749.mm/);
   assert.match(await page.textContent('#findings'), /Undercut ring tips/);
   // The finding links to its other fields.
   await page.click(`${notes(RADIUS)} .explanation button:has-text("Semi-minor axis")`);

@@ -17,11 +17,11 @@ const WIDE = 0.75;
 /** How far a part is set back from the one without gaps: drawn, and open at its contact until the load closes it. */
 const clearance = (part, symbol) => number(`/parts/${part}/clearance_um`, symbol, 'µm', { slider: WIDE, optional: () => t('empty.none'), step: 1 });
 
-/** How many of its fields a document gives. */
-function givenCount(design, group) {
-  const count = fieldsOf(group).filter(({ pointer }) => at(design, pointer) != null).length;
-  return count === 0 ? t('summary.defaults') : t('summary.given_count', { count });
-}
+/** How many of its own fields a document gives other than 0; `none` where there are none. */
+const givenCount = (none) => (design, group) => {
+  const count = fieldsOf(group).filter(({ pointer }) => at(design, pointer)).length;
+  return count === 0 ? t(`summary.${none}`) : t('summary.given_count', { count });
+};
 
 /** At each contact the clearance of both parts, with what `modification` sets back along normals; its shifts and turns vary along the flank. */
 function clearancesInWords(design) {
@@ -273,7 +273,7 @@ export const GROUPS = [
   {
     ...group('/clearances'),
     open: true,
-    summary: givenCount,
+    summary: givenCount('none'),
     told: clearancesInWords,
     fields: [clearance('wave_generator', 'c_H'), clearance('ring', 'c_K'), clearance('carrier', 'c_S'), clearance('teeth', 'c_r')],
   },
@@ -353,7 +353,7 @@ export const GROUPS = [
   },
   {
     ...group('/parts'),
-    summary: givenCount,
+    summary: givenCount('defaults'),
     parts: [
       {
         title: t('part.wave_generator'),

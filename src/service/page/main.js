@@ -285,7 +285,7 @@ function onResult({ design, answers, problems, solveMs }) {
   document.body.classList.toggle('stale', !isDrawn);
   showNotes();
   showFindings();
-  showEffect(state.remedied, state.findings, state.shown?.answers);
+  showEffect(isDrawn ? state.remedied : undefined, state.findings, answers);
   state.remedied = undefined;
   const kept = isDrawn ? t('status.geometry_only') : t('status.last_design');
   status.show(state, state.shown ? kept : '');
