@@ -237,20 +237,20 @@ test('peaks state their model error', async () => {
   const told = () => page.$$eval('#table .told', (lines) => lines.map((line) => line.textContent));
   // The paper's model, whose forces are too large, without wind-up.
   const estimated = 'Estimated from the parts as they are made. Forces leave it out until you take it over.';
-  assert.deepEqual(await told(), ['The model’s own error: force +1 to +8 %, stress −1 to +5 %; not measured with other sizes and loads under its law.', '', '', estimated]);
+  assert.deepEqual(await told(), ['The model’s own error: force +1 to +8\u202f%, stress −1 to +5\u202f%. It was not measured for other sizes and loads under its law.', '', '', estimated]);
   const { model, ...unnamed } = await designOf(page);
   assert.ok(model);
   const carrier = { fingers: 'held_at_both_ends' };
   await setDocument(page, { ...unnamed, parts: { carrier }, sweep: { wind_up: true } });
   assert.deepEqual(await told(), [
-    'The model’s own error: force −1 to 0 %, stress −2 to +1 %.',
+    'The model’s own error: force −1 to 0\u202f%, stress −2 to +1\u202f%.',
     '',
-    'The model’s own error: wind-up −2 to −1 % where bodies are held at the law’s depth. ' +
-      'Besides, for a housed rim and stiff fingers: by the estimates −13 %, −25 to −20 % in earlier calculations of elastic bodies.',
+    'The model’s own error: wind-up −2 to −1\u202f%, with bodies that are rigid below the depth of the contact law. ' +
+      'Besides, for a housed rim and fingers held at both ends: by the estimates −13 %, −25 to −20\u202f% in earlier calculations of elastic bodies.',
     estimated,
   ]);
   await setDocument(page, { ...unnamed, parts: { carrier, ring: { clearance_um: 20 } } });
-  assert.match((await told())[0], /; not measured with larger clearances, a larger wind-up\.$/);
+  assert.match((await told())[0], /It was not measured for larger clearances, a larger wind-up\.$/);
   await pick(page, LAW, 'fixed');
   assert.equal((await told())[0], 'The model’s own error: not measured under this law.');
 });

@@ -66,7 +66,7 @@ test('every code, quantity, example and material has Chinese texts', async () =>
 });
 
 /** Names, units and words of the document, which are the same in every language. */
-const SAME = /\b(toothwave|English|Palmgren|Johnson|Archard|Ctrl|Shift|arcmin|deg|rad|min|convert)\b|“Research.*drives”|Wang Su.*Chunyan|docs\/\S+|\/[a-z]\w*\/\w+/g;
+const SAME = /\b(toothwave|English|Palmgren|Johnson|Archard|Ctrl|Shift|arcmin|deg|rad|min|convert)\b|“Research.*drives”|Wang Su.*Chunyan|docs\/\S+|http:\S+|\/[a-z]\w*\/\w+/g;
 
 /** What stands in the page as text, or as the name of something, and still has English words. */
 async function english(page, within) {

@@ -97,3 +97,26 @@ test('comparison prints the inputs that differ', async () => {
   assert.match(text, /Inputs that differ ?from the reference/);
   assert.match(text, /Input torque\s+3.N·m\s+20.N·m/);
 });
+
+test('report names findings, load, assumption and symbols on page one', async () => {
+  const page = await bed.open({ example: null });
+  await enter(page, '/load/input_torque_nm', 60);
+  const pages = await printed(page);
+  assert.equal(pages.length, 2);
+  const first = pages[0].join('\n');
+  for (const wanted of [/At 60.N·m input torque \(840/, /Stress above the/, /far ends joined,\s+assumed|assumed/, /ψ: position/, /http:\/\/127/, /1 \/ 2/]) assert.match(first, wanted);
+  // The enlarged tooth is the most loaded one, whatever is selected.
+  await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
+  const loads = await page.textContent('#tooth-state');
+  assert.ok(Number(/up to (\d+)/.exec(loads)[1]) > 1500, loads);
+});
+
+test('reference of the same name is told apart', async () => {
+  const page = await bed.open({ example: null });
+  await enter(page, '/load/input_torque_nm', 25);
+  await page.click('#keep');
+  await enter(page, '/load/input_torque_nm', 30);
+  const pages = await printed(page);
+  assert.equal(pages.length, 2);
+  assert.match(pages[0].join('\n'), /compared with the reference First design \(changed\), with input torque\s+25.N·m/);
+});

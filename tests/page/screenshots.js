@@ -45,7 +45,7 @@ await take('first-drive', { viewport: { ...WIDE.viewport, height: 1000 }, exampl
 await take('undercut', { viewport: { ...WIDE.viewport, height: 1000 }, example: null }, async (page) => {
   await page.click('#keep');
   await enter(page, '/drive/teeth/radius_mm', 7);
-  await page.locator(`${notes('/drive/teeth/radius_mm')} .finding`).first().click();
+  await page.locator(`${notes('/drive/teeth/radius_mm')} .finding`, { hasText: 'Undercut' }).click();
   await showPeak(page);
   await page.evaluate(() => scrollTo(0, 0));
 });

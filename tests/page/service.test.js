@@ -91,9 +91,9 @@ test('many input angles are thinned in drawing only', async () => {
       drawn: drawn.states.tooth.length,
       areAll: drawn.states.tooth.every((_, row) => all.has(key(drawn.states, row))),
       hasPeaks: peaks.every((angle) => drawn.states.input_angle_deg.includes(angle)),
-      carrying: [drawn.carrying_teeth.min, drawn.carrying_teeth.max],
+      carrying: [drawn.loaded_teeth_per_zone.min, drawn.loaded_teeth_per_zone.max],
       wanted: [Math.min(...counts.values()), Math.max(...counts.values())],
-      rest: JSON.stringify({ ...drawn, states: undefined, carrying_teeth: undefined }) === JSON.stringify({ ...whole, states: undefined }),
+      rest: JSON.stringify({ ...drawn, states: undefined }) === JSON.stringify({ ...whole, states: undefined }),
       jumps: [jumps(drawn), jumps(whole)],
       frames: new Motion(asked, geometry, drawn).frames.length,
     };

@@ -8,7 +8,7 @@ const bed = testBed({ before, after, afterEach });
 
 test('introduction has few sentences and can be hidden', async () => {
   const page = await bed.open();
-  assert.match(await page.textContent('#intro p'), /wave generator, here an ellipse, pushes loose teeth.*Change the design/);
+  assert.match(await page.textContent('#intro p'), /wave generator, in the picture an ellipse, pushes loose teeth.*Change the design/);
   for (const label of ['Ring', 'Tooth', 'Carrier', 'Wave generator']) assert.ok((await page.textContent('.picture')).includes(label));
   // No label is truncated.
   const cut = await page.$$eval('.picture text', (texts) => texts.filter((text) => {

@@ -61,11 +61,15 @@ export function oncePerFrame(work) {
   };
 }
 
-/** Puts an open popover below its button, or above it where there is no room. */
+/** Puts an open popover beside the form that its button is in, so that it covers no field; else below the button, or above it, where there is
+ *  room. */
 export function placeBeside(popover, button) {
   const { left, bottom, top } = button.getBoundingClientRect();
   const { offsetWidth: width, offsetHeight: height } = popover;
+  const { clientWidth } = document.documentElement;
+  const formEnd = (button.closest('form')?.getBoundingClientRect().right ?? clientWidth) + 8;
+  const isBeside = formEnd + width + 8 <= clientWidth;
   const below = bottom + 6 + height <= innerHeight;
-  popover.style.left = `${Math.max(8, Math.min(left, document.documentElement.clientWidth - width - 8))}px`;
-  popover.style.top = `${below ? bottom + 6 : Math.max(8, top - 6 - height)}px`;
+  popover.style.left = `${isBeside ? formEnd : Math.max(8, Math.min(left, clientWidth - width - 8))}px`;
+  popover.style.top = `${isBeside ? Math.max(8, Math.min(top, innerHeight - height - 8)) : below ? bottom + 6 : Math.max(8, top - 6 - height)}px`;
 }

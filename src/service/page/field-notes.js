@@ -79,9 +79,10 @@ export class FieldNotes {
     }
     if (this.told?.differences.length > 0) add(this.placeOf(this.told.pointer), 'info', JSON.stringify(this.told), () => ({ element: this.#toldNote(this.told) }));
     for (const finding of this.findings) {
-      for (const place of new Set(finding.pointers.map((pointer) => this.placeOf(pointer)))) {
-        add(place, finding.severity, finding.key, () => this.#findingNote(finding, place)).show(finding);
-      }
+      // It stands at the field to change first; the others are only marked.
+      const [place, ...others] = new Set(finding.pointers.map((pointer) => this.placeOf(pointer)));
+      add(place, finding.severity, finding.key, () => this.#findingNote(finding, place)).show(finding);
+      for (const other of others) if (!worst.has(other)) worst.set(other, finding.severity);
     }
     return { contents, worst, built };
   }
@@ -140,7 +141,7 @@ export class FieldNotes {
   }
 
   #findingNote(first, place) {
-    const { key, pointers } = first;
+    const { key } = first;
     const panel = html('div', { id: `${idOf(place, 'why')}-${key}`, hidden: true });
     const button = html('button', { type: 'button', class: 'finding', 'aria-expanded': 'false', 'aria-controls': panel.id }, titleOf(first));
     button.addEventListener('click', () => {
@@ -149,14 +150,12 @@ export class FieldNotes {
     });
     const remedy = html('div', {});
     const element = html('div', {}, button, remedy, panel);
-    // The first field is the one to change first; the others only refer to the finding.
-    const isMinor = this.placeOf(pointers[0]) !== place;
     let shown;
     const show = (finding) => {
       if (isSame(finding, shown)) return;
       shown = finding;
-      element.className = `note ${finding.severity}${isMinor ? ' minor' : ''}`;
-      setChildren(remedy, isMinor ? [] : [this.actions.remedyButton(finding)].filter(Boolean));
+      element.className = `note ${finding.severity}`;
+      setChildren(remedy, [this.actions.remedyButton(finding)].filter(Boolean));
       panel.replaceChildren(explanation(finding, (pointer) => this.labelOf(pointer), (pointer) => this.goTo(pointer)));
     };
     return { element, show };

@@ -5,7 +5,8 @@ import {
   USUAL_FRICTION, USUAL_SPEED_RPM, at, compatibilityOf, isBall, isGiven, lawOf, lobesOf, ratioOf, sizeOf, withDuty, withFriction, withLaw, withProjectedLaw, withRatio,
   withRing, withVirtualWork,
 } from './design.js';
-import { choice, flag, group, lines, number, oneOf, unlessSaid, variant, whole } from './field.js';
+import { choice, fieldsOf, flag, group, lines, number, oneOf, unlessSaid, variant, whole } from './field.js';
+import { number as format, withUnit } from './format.js';
 import { STRENGTHS } from './strengths.js';
 import { counted, t, textOf } from './texts.js';
 
@@ -14,14 +15,28 @@ const NARROW = 0.05;
 const WIDE = 0.75;
 
 /** How far a part is set back from the one without gaps: drawn, and open at its contact until the load closes it. */
-const clearance = (part) => number(`/parts/${part}/clearance_um`, 'c', 'µm', { slider: WIDE, optional: () => t('empty.none'), step: 1 });
+const clearance = (part, symbol) => number(`/parts/${part}/clearance_um`, symbol, 'µm', { slider: WIDE, optional: () => t('empty.none'), step: 1 });
+
+/** How many of its own fields a document gives other than 0; `none` where there are none. */
+const givenCount = (none) => (design, group) => {
+  const count = fieldsOf(group).filter(({ pointer }) => at(design, pointer)).length;
+  return count === 0 ? t(`summary.${none}`) : t('summary.given_count', { count });
+};
+
+/** At each contact the clearance of both parts, with what `modification` sets back along normals; its shifts and turns vary along the flank. */
+function clearancesInWords(design) {
+  const sum = (...pointers) => withUnit(format(pointers.reduce((total, pointer) => total + (at(design, pointer) ?? 0), 0)), 'µm');
+  const contact = (part, modification) => sum(`/parts/${part}/clearance_um`, '/parts/teeth/clearance_um', `/modification/${modification}`, '/modification/tooth_radius_um');
+  const [wave_generator, ring, carrier] = [contact('wave_generator', 'wave_generator_equidistant_um'), contact('ring', 'ring_equidistant_um'), contact('carrier', 'slot_wall_um')];
+  return t('form.clearances', { wave_generator, ring, carrier });
+}
 
 /** Steel, as the service fills in what a document leaves out. */
 const material = (part) => {
   const title = t(`part.${part}`);
   return {
     title,
-    filled: `/materials/${part}`,
+    part,
     fields: [
       number(`/materials/${part}/youngs_modulus_gpa`, 'E', 'GPa', { label: t('label.youngs_modulus'), preset: 210, of: title }),
       number(`/materials/${part}/poissons_ratio`, 'ν', '', { label: t('label.poissons_ratio'), preset: 0.3, of: title, step: 0.01 }),
@@ -253,11 +268,14 @@ export const GROUPS = [
           fields: [stiffness('wave_generator', 'k_H'), stiffness('ring', 'k_K'), stiffness('carrier', 'k_S')],
         },
       ], { otherwise: lawOf, adjust: withLaw }),
-      clearance('wave_generator'),
-      clearance('ring'),
-      clearance('carrier'),
-      clearance('teeth'),
     ],
+  },
+  {
+    ...group('/clearances'),
+    open: true,
+    summary: givenCount('none'),
+    told: clearancesInWords,
+    fields: [clearance('wave_generator', 'c_H'), clearance('ring', 'c_K'), clearance('carrier', 'c_S'), clearance('teeth', 'c_r')],
   },
   {
     ...group('/friction'),
@@ -335,10 +353,7 @@ export const GROUPS = [
   },
   {
     ...group('/parts'),
-    summary: (design) => {
-      const given = Object.values(at(design, '/parts') ?? {}).flatMap((part) => Object.values(part ?? {})).filter((value) => value !== null);
-      return given.length === 0 ? t('summary.defaults') : t('summary.given_count', { count: given.length });
-    },
+    summary: givenCount('defaults'),
     parts: [
       {
         title: t('part.wave_generator'),

@@ -8,7 +8,7 @@ import { Form } from './form.js';
 import { number } from './format.js';
 import { Front } from './front.js';
 import { apart, bestOf, held, limitInWords, roomFor, shareOf, together } from './reasons.js';
-import { FIRST, GROUPS, ROOT, faultsOf, fieldOf, goalsOf, searchesOf } from './requirements.js';
+import { FIRST, GROUPS, ROOT, faultsOf, fieldOf, goalsOf, searchesOf, withAllowables } from './requirements.js';
 import { bestRounded, roundingOf } from './rounding.js';
 import { Run } from './studies.js';
 import { capital, counted, labelled, small, t } from './texts.js';
@@ -26,6 +26,8 @@ export class Find {
   #attempt = 0;
   #isCancelled = false;
   #asked;
+  /** The requirements that the shown drives keep. */
+  #kept;
 
   /** `onOpen(design, title)` when a drive is taken as design, `onOpenBoth` with another one as reference. */
   constructor(section, { quantities, onOpen, onOpenBoth }) {
@@ -48,15 +50,15 @@ export class Find {
       { class: 'panel', 'aria-labelledby': 'find-title' },
       html('header', {}, html('h2', { id: 'find-title', tabindex: '-1' }, t('view.find'))),
       html('p', { class: 'none' }, t('find.intro')),
-      this.progress.element,
       this.state,
     );
+    this.earlier = html('p', { class: 'note warning', hidden: true }, t('find.earlier'));
     this.reasons = html('section', { class: 'panel', 'aria-labelledby': 'reasons-title', hidden: true });
-    const column = html('div', { role: 'main', class: 'find-results' }, this.results);
+    const column = html('div', { role: 'main', class: 'find-results' }, this.progress.element, this.results, this.earlier);
     this.front = new Front(column, {
       quantities,
-      onOpen: ({ design, name, label }) => onOpen(design, t('find.drive_title', { name, label })),
-      onOpenBoth: (found, reference) => onOpenBoth({ design: found.design, title: found.name }, { design: reference.design, title: reference.name }),
+      onOpen: ({ design, name, label }) => onOpen(withAllowables(design, this.#kept), t('find.drive_title', { name, label })),
+      onOpenBoth: (...both) => onOpenBoth(...both.map(({ design, name }) => ({ design: withAllowables(design, this.#kept), title: name }))),
     });
     this.preview = previewOf();
     column.append(this.reasons, this.preview);
@@ -74,7 +76,8 @@ export class Find {
   #check() {
     const { faults, isEmpty } = faultsOf(this.#requirements);
     this.form.setResult({}, faults, []);
-    const isOutdated = this.#asked !== undefined && !isSame(this.#asked, this.#requirements);
+    const isOutdated = this.#kept !== undefined && !isSame(this.#kept, this.#requirements);
+    this.earlier.hidden = !isOutdated || this.front.panel.hidden;
     this.reasons.classList.toggle('outdated', isOutdated);
     this.front.panel.classList.toggle('outdated', isOutdated);
     return faults.length === 0 && !isEmpty;
@@ -89,7 +92,7 @@ export class Find {
       return;
     }
     this.#asked = this.#requirements;
-    this.#check();
+    this.preview.hidden = true;
     const goals = goalsOf(this.#requirements);
     const searches = searchesOf(this.#requirements);
     const [answers, notes] = [[], []];
@@ -145,7 +148,9 @@ export class Find {
 
   /** Shows what was found, and keeps it for when the page is loaded anew. */
   #finish(found) {
+    this.#kept = this.#asked;
     this.#show(found);
+    this.#check();
     try {
       sessionStorage.setItem(KEPT, JSON.stringify({ requirements: this.#asked, found: { ...found, drives: undefined } }));
     } catch {
@@ -158,7 +163,7 @@ export class Find {
     try {
       const { requirements, found } = JSON.parse(sessionStorage.getItem(KEPT)) ?? {};
       if (!found) return;
-      this.#asked = requirements;
+      this.#kept = requirements;
       this.#edit(requirements);
       this.#show(found);
     } catch {

@@ -13,9 +13,11 @@ export class FindingsList {
     Object.assign(this, { container, labelOf, goTo, remedyButton });
   }
 
-  show(findings, hasReasons) {
-    setText(this.#none, hasReasons ? t('findings.reasons_first') : t('findings.none'));
-    setChildren(this.container, findings.length > 0 ? findings.map((finding) => this.#noteOf(finding)) : [this.#none]);
+  /** `assumptions` are sentences that hold beside the findings. */
+  show(findings, hasReasons, assumptions) {
+    const told = findings.length > 0 || assumptions.length > 0 ? assumptions.join(' ') : t('findings.none');
+    setText(this.#none, hasReasons ? t('findings.reasons_first') : told);
+    setChildren(this.container, [...findings.map((finding) => this.#noteOf(finding)), this.#none]);
   }
 
   /** A note stays, opened or not, while the numbers of its finding change. */

@@ -48,14 +48,18 @@ export function explanation(finding, labelOf, goTo) {
   );
 }
 
+/** A wall that is not there is no matter of a rule of thumb. */
+const asFault = (finding) => (finding.code === 'thin_slot_wall' && finding.value <= 0 ? { ...finding, code: 'no_slot_wall', severity: 'problem', limit: 0 } : finding);
+
 /** All findings of a result, each once, with a key that stays while numbers change. */
 export function findingsOf(answers) {
   const unique = new Map();
   for (const finding of [answers.sweep, answers.geometry, answers.coincidence].flatMap((answer) => answer?.findings ?? [])) {
-    unique.set(JSON.stringify([finding.code, finding.detail]), findingInWords(finding));
+    unique.set(JSON.stringify([finding.code, finding.detail]), findingInWords(asFault(finding)));
   }
   const counts = new Map();
-  return [...unique.values()].map((finding) => {
+  const faultsFirst = [...unique.values()].sort((one, other) => (other.severity === 'problem') - (one.severity === 'problem'));
+  return faultsFirst.map((finding) => {
     const name = `${finding.code}-${contactOf(finding)?.key ?? ''}`;
     const count = (counts.get(name) ?? 0) + 1;
     counts.set(name, count);

@@ -7,11 +7,15 @@ import { GROUPS } from './fields.js';
 import { linesOf, linesRead } from './lines.js';
 import { html, setProperties, setText, symbol } from './dom.js';
 import { number, typed } from './format.js';
+import { knownMaterials, materialsOf, titleOf } from './materials.js';
 import { remedyOf } from './remedies.js';
 import { inputDifferences } from './report.js';
 import { Slider, niceStep, rounded } from './slider.js';
 import { TERMS, explained } from './terms.js';
-import { SERVICE, labelled, t } from './texts.js';
+import { labelled, t } from './texts.js';
+
+const sourceOf = ({ elasticity_source: source, allowable_stress_mpa: allowable, allowable_stress_source: stress_source }) =>
+  allowable === undefined ? t('form.no_allowable', { source }) : t('form.allowable', { source, stress: number(allowable), stress_source });
 
 export class Form {
   #fields = new Map();
@@ -22,15 +26,15 @@ export class Form {
   #onEnd;
   #design = {};
   #answers = {};
-  #materials = [];
   #fillings = [];
 
-  /** `onEdit(design, gesture)` at each change; changes of one gesture are one step to undo; `onEnd()` ends it; `onSearch(design)` looks for a drive
-   *  like it. All fields stand below the pointer `root`. */
-  constructor(container, { onEdit, onEnd, onSearch }, groups = GROUPS, root = '') {
+  /** `onEdit(design, gesture)` at each change; changes of one gesture are one step to undo; `onEnd()` ends it; `onRemedy(finding)` comes before its
+   *  remedy; `onSearch(design)` looks for a drive like it. All fields stand below the pointer `root`. */
+  constructor(container, { onEdit, onEnd, onRemedy, onSearch }, groups = GROUPS, root = '') {
     this.container = container;
     this.#onEdit = onEdit;
     this.#onEnd = onEnd;
+    this.onRemedy = onRemedy;
     this.notes = new FieldNotes(container, this.#fields, this.#groups, {
       isHeld: () => this.isHeld,
       fix: (pointer, value) => this.#fix(pointer, value),
@@ -74,41 +78,47 @@ export class Form {
     for (const part of group.parts ?? [group]) {
       const set = html('div', { class: 'set', role: 'group', 'aria-label': part.title });
       if (group.parts) set.append(html('h4', {}, part.title), part.hint ? html('p', { class: 'hint' }, part.hint) : '');
-      if (part.filled) set.append(this.#buildFilling(part));
+      if (part.part) set.append(this.#buildFilling(part));
       for (const field of part.fields) set.append(this.#buildField(field));
       details.append(set);
     }
-    this.#groups.push({ group, details, summary });
+    const told = group.told && html('p', { class: 'hint told' });
+    if (told) details.append(told);
+    this.#groups.push({ group, details, summary, told });
     return details;
   }
 
   /** What fills in a part's numbers by name; it is hidden until there are names. */
-  #buildFilling({ filled, title }) {
+  #buildFilling({ part, title }) {
     const select = html('select', { 'aria-label': t('form.material', { part: title }) });
-    const source = html('p', { class: 'hint', hidden: true });
+    const source = html('p', { class: 'hint' });
     const element = html('div', { class: 'filling', hidden: true }, select, source);
+    const filling = { part, element, select, source, chosen: '' };
     select.addEventListener('change', () => {
-      const material = this.#materials.find(({ name }) => name === select.value);
-      const { youngs_modulus_gpa, poissons_ratio, elasticity_source, allowable_stress_mpa: allowable, allowable_stress_source } = material;
-      this.#edit(filled, { youngs_modulus_gpa, poissons_ratio });
+      filling.chosen = select.value;
+      const { youngs_modulus_gpa, poissons_ratio } = knownMaterials().find(({ name }) => name === select.value);
+      this.#edit(`/materials/${part}`, { youngs_modulus_gpa, poissons_ratio });
       this.setDesign(this.#design);
-      const given = { source: elasticity_source, stress: number(allowable), stress_source: allowable_stress_source };
-      setText(source, allowable === undefined ? t('form.no_allowable', given) : t('form.allowable', given));
-      source.hidden = false;
-      select.value = '';
       this.#onEnd();
     });
-    this.#fillings.push({ element, select });
+    this.#fillings.push(filling);
     return element;
   }
 
-  /** Offers materials by name, `{ name, title, youngs_modulus_gpa, … }`. */
-  offerMaterials(materials) {
-    this.#materials = materials;
+  /** Offers the known materials by name. */
+  offerMaterials() {
     for (const { element, select } of this.#fillings) {
-      select.replaceChildren(html('option', { value: '' }, t('form.fill_in')), ...materials.map(({ name, title }) => html('option', { value: name }, SERVICE.materials?.[name] ?? title)));
-      element.hidden = materials.length === 0;
+      select.replaceChildren(html('option', { value: '', disabled: true }, t('form.fill_in')), ...knownMaterials().map(({ name, title }) => html('option', { value: name }, title)));
+      element.hidden = knownMaterials().length === 0;
     }
+  }
+
+  /** The material that has a part's numbers; of several that share them the one that was chosen. */
+  #showFilling({ part, chosen, select, source }) {
+    const found = materialsOf(this.#design, part);
+    const material = found.find(({ name }) => name === chosen) ?? (found.length === 1 ? found[0] : undefined);
+    setProperties(select, { value: material?.name ?? '' });
+    setText(source, material ? sourceOf(material) : titleOf(found));
   }
 
   #buildField(field) {
@@ -156,6 +166,7 @@ export class Form {
     const remedy = remedyOf(finding, this.#answers, this.#design);
     if (!remedy) return undefined;
     const apply = () => {
+      this.onRemedy(finding);
       this.#replace(remedy.change(this.#design), finding.pointers[0]);
       this.#onEnd();
       this.setDesign(this.#design);
@@ -326,7 +337,11 @@ export class Form {
     if (!isSame(design, this.#design)) this.notes.told = undefined;
     this.#design = design;
     for (const entry of this.#fields.values()) this.#showValue(entry, respan);
-    for (const { group, summary } of this.#groups) setText(summary, group.summary?.(design) ?? '');
+    for (const { group, summary, told } of this.#groups) {
+      setText(summary, group.summary?.(design, group) ?? '');
+      if (told) setText(told, group.told(design));
+    }
+    for (const filling of this.#fillings) this.#showFilling(filling);
   }
 
   /** Shows the option that is chosen; what no design like this one can have is not offered. */

@@ -115,9 +115,9 @@ export class Front {
     const [xName, yName] = [this.xChoice.value, this.yChoice.value];
     const axis = (name) => ({ label: this.quantities.headed(name), ...spread(this.#front.map(({ quantities }) => quantities[name])) });
     this.frame = axes(width, Math.min(HEIGHT, 0.9 * width), axis(xName), axis(yName));
-    this.points = this.#front.map(({ quantities, search }) => {
+    this.points = this.#front.map(({ name, quantities, search }) => {
       const [x, y] = [this.frame.x(quantities[xName]), this.frame.y(quantities[yName])];
-      return { x, y, element: svg('path', { ...mark(search), transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})` }) };
+      return { x, y, element: svg('path', { ...mark(search), transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})` }, svg('title', {}, labelled(name, [xName, yName].map((each) => this.quantities.shown(each, quantities[each])).join(t('list.comma'))))) };
     });
     this.frame.plot.append(...this.points.map(({ element }) => element));
     this.chart.replaceChildren(this.frame.root);

@@ -8,8 +8,9 @@ import { Comparison } from './comparison.js';
 import { converted } from './convert.js';
 import { changed, isSame, withVirtualWork } from './design.js';
 import { listenToDocument } from './document-dialog.js';
-import { byId, oncePerFrame, setAttributes, setProperties, setText } from './dom.js';
+import { byId, oncePerFrame, setProperties, setText } from './dom.js';
 import { Drawings } from './drawings.js';
+import { showEffect } from './effect.js';
 import { Examples, shortTitle } from './examples.js';
 import { Explore } from './explore.js';
 import { Find } from './find.js';
@@ -20,6 +21,7 @@ import { number } from './format.js';
 import { History } from './history.js';
 import { listenToLogin } from './login.js';
 import { Losses } from './losses.js';
+import { learnMaterials, unpublished } from './materials.js';
 import { Mechanism, stressColor } from './mechanism.js';
 import { listenToMenus } from './menus.js';
 import { Motion } from './motion.js';
@@ -35,7 +37,8 @@ import * as share from './share.js';
 import { Sight } from './sight.js';
 import { Status } from './status.js';
 import { glossary, term } from './terms.js';
-import { t, writeTexts } from './texts.js';
+import { small, t, writeTexts } from './texts.js';
+import { Tiles } from './tiles.js';
 import { Tolerance } from './tolerance.js';
 import { Turning } from './turning.js';
 import { Views } from './views.js';
@@ -52,6 +55,9 @@ const state = {
   problems: [],
   reasons: [],
   findings: [],
+  assumptions: [],
+  /** A finding whose remedy was applied, with the answers before: `{ finding, answers }`. */
+  remedied: undefined,
   /** Where the design comes from: `{ title, design }` of an example or a file, null of a design of its own. */
   origin: null,
   view: 'design',
@@ -81,6 +87,9 @@ const form = new Form(byId('form'), {
     showComparison();
     render();
   },
+  onRemedy(finding) {
+    state.remedied = { finding, answers: state.shown.answers };
+  },
   onSearch(design) {
     find.askLike(design, state.shown?.answers);
     views.goTo('find');
@@ -96,8 +105,10 @@ const mechanism = new Mechanism(
 
 const plots = new Plots({ abscissae: byId('abscissae'), contacts: byId('contacts'), charts: byId('charts'), readout: byId('readout') }, (positionDeg) => turning.stopAtPosition(positionDeg));
 
+const tiles = new Tiles(byId('load-line'), byId('key-figures'));
+
 const results = new Results(
-  { keyFigures: byId('key-figures'), table: byId('table') },
+  { table: byId('table'), more: byId('more') },
   (peak) => turning.stopAtPeak(peak),
   goTo,
   ({ pointer, value }) => setDesign(withVirtualWork(changed(state.design, pointer, value))),
@@ -270,9 +281,12 @@ function onResult({ design, answers, problems, solveMs }) {
     setText(byId('solved'), t('results.solved', { version: answers.geometry.solver_version, ms: number(solveMs, 2) }));
   }
   state.findings = isDrawn ? findingsOf(answers) : [];
+  state.assumptions = isDrawn ? unpublished(design) : [];
   document.body.classList.toggle('stale', !isDrawn);
   showNotes();
   showFindings();
+  showEffect(isDrawn ? state.remedied : undefined, state.findings, answers);
+  state.remedied = undefined;
   const kept = isDrawn ? t('status.geometry_only') : t('status.last_design');
   status.show(state, state.shown ? kept : '');
   showComparison();
@@ -287,16 +301,25 @@ function showNotes() {
 
 /** A list that grows under a held slider would push the table away; the line at the top says the same. */
 function showFindings() {
-  if (!form.isHeld) findingsList.show(state.findings, state.reasons.length > 0);
+  if (!form.isHeld) findingsList.show(state.findings, state.reasons.length > 0, state.assumptions);
 }
 
 function showComparison() {
   const { reference, shown } = state;
-  if (shown) results.updateKeyFigures(shown.answers, reference?.answers, form.isHeld);
+  if (shown) tiles.update(shown.answers, reference?.answers, form.isHeld);
   if (!form.isHeld || sight.plots.isSeen) showPlots();
   if (!form.isHeld || sight.table.isSeen) showTable();
   mechanism.setReference(reference);
-  comparison.show(reference, shown && reference ? inputDifferences(shown.design, reference.design) : [], form.isHeld);
+  comparison.show(reference && { ...reference, name: referenceName() }, shown && reference ? inputDifferences(shown.design, reference.design) : [], form.isHeld);
+}
+
+/** A reference that has the name of the design is told apart by its inputs. */
+function referenceName() {
+  const { reference, shown } = state;
+  const differences = inputDifferences(shown?.design ?? state.design, reference.design);
+  if (reference.name !== nameOf(state.design) || differences.length === 0) return reference.name;
+  const [{ label, reference: value }] = differences;
+  return t('comparison.named', { name: reference.name, label: small(label), value });
 }
 
 /** The pass of a result, for the plots. */
@@ -310,7 +333,7 @@ const showPlots = () => plots.setPasses(passOfResult(state.shown), passOfResult(
 
 function showTable() {
   const { shown, reference } = state;
-  if (shown) results.updateTable(shown.answers, reference?.answers, form.isHeld);
+  if (shown) results.update(shown.answers, reference?.answers, form.isHeld);
 }
 
 const render = oncePerFrame(() => {
@@ -345,7 +368,7 @@ function clearReference() {
   showComparison();
   render();
   addressLater();
-  byId('keep').focus();
+  byId('keep').focus({ preventScroll: true });
 }
 
 function swapReference() {
@@ -362,16 +385,25 @@ function reported() {
   const design = isStale ? state.design : state.shown.design;
   const reasons = state.reasons.map(({ title, detail, pointer }) => ({ title, detail, label: pointer && labelOf(pointer) }));
   const version = isStale ? undefined : state.shown.answers.geometry.solver_version;
-  return [nameOf(design), { design, version, reference: state.reference, reasons }];
+  return [nameOf(design), { design, version, reference: state.reference && referenceName(), reasons }];
 }
 
 function print(isPrinting) {
   if (isPrinting) {
     byId('findings-table').replaceChildren(...findingsTable(state.findings));
     byId('report').replaceChildren(...reportOf(...reported(), location.href));
+    if (motion) showMostLoaded();
   }
   document.documentElement.classList.toggle('printing', isPrinting);
   plots.print(isPrinting);
+}
+
+/** A reader of paper cannot choose another tooth. */
+function showMostLoaded() {
+  const largest = ({ stress }) => Math.max(...Object.values(stress));
+  const [most] = motion.loaded(turning.inputDeg).sort((one, other) => largest(other) - largest(one));
+  if (most) turning.select(most.tooth);
+  turning.show(mechanism.render(turning));
 }
 
 // ---- the start
@@ -419,8 +451,8 @@ function listen() {
     writeAddress();
     copy(location.href, currentTarget);
   });
+  click('to-table', () => byId('table-title').scrollIntoView({ block: 'start' }));
   click('to-parts', () => goToField('/parts/wave_generator/bore_radius_mm'));
-  click('more', ({ currentTarget }) => setAttributes(currentTarget, { 'aria-expanded': byId('table').classList.toggle('all') }));
   click('zoom-in', () => zoomBy(Math.SQRT2));
   click('zoom-out', () => zoomBy(Math.SQRT1_2));
   click('intro-find', () => views.goTo('find'));
@@ -454,7 +486,8 @@ async function start() {
   listen();
   await load();
   // Names save typing; without them the numbers can still be entered.
-  getJson('v1/materials').then(({ materials }) => form.offerMaterials(materials), () => {});
+  learnMaterials((await getJson('v1/materials').catch(() => ({ materials: [] }))).materials);
+  form.offerMaterials();
   find.restore();
   if (!fromAddress({ atStart: true })) {
     const { first } = examples;

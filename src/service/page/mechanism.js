@@ -274,7 +274,7 @@ export class Mechanism {
     );
     this.mostForce = html('span', { class: 'number' });
     const contacts = CONTACTS.map(({ key, name }) =>
-      html('li', {}, html('span', { class: `swatch part-${key}`, 'aria-hidden': 'true' }), name),
+      html('li', {}, html('span', { class: `swatch part-${key}`, 'aria-hidden': 'true' }), key === 'carrier' ? t('mechanism.carrier') : name),
     );
     this.ghostItem = html('li', { hidden: true }, html('span', { class: 'swatch ghost', 'aria-hidden': 'true' }), t('comparison.reference'));
     this.legend.append(

@@ -28,5 +28,9 @@ export function listenToMenus() {
   for (const link of document.querySelectorAll('.skip')) link.addEventListener('click', skip);
   byId('help').addEventListener('click', () => byId('help-dialog').showModal());
   byId('help-close').addEventListener('click', () => byId('help-dialog').close());
+  byId('effect-hide').addEventListener('click', () => {
+    byId('effect').hidden = true;
+  });
+  byId('print-page').addEventListener('click', () => print());
   new Toolbar(byId('tools'));
 }

@@ -21,7 +21,7 @@ const HEADROOM = 1.14;
 
 const SCREEN = { height: 270 };
 /** Half a page's width in CSS pixels: letters then keep their size on paper. */
-const PAPER = { width: 340, height: 210 };
+const PAPER = { width: 340, height: 165 };
 
 class Plot {
   constructor(quantity, figure, container, owner) {

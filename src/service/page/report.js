@@ -8,6 +8,7 @@ import { html } from './dom.js';
 import { contactOf, kindOf as kindOfFinding, meaningOf, sourceOf } from './findings.js';
 import { DASH, number, withUnit } from './format.js';
 import { linesOf } from './lines.js';
+import { materialsOf, titleOf } from './materials.js';
 import { labelled, listed, t } from './texts.js';
 import { sentence } from './words.js';
 
@@ -63,7 +64,7 @@ export function inputDifferences(design, reference) {
   return found;
 }
 
-/** The report on a design; of one that cannot exist, `reasons` why, `{ title, detail, label }`, in place of its numbers. */
+/** The report on a design, compared with a `reference` by name; of one that cannot exist, `reasons` why, `{ title, detail, label }`, in place of its numbers. */
 export function reportOf(name, { design, version, reference, reasons }, address) {
   const groups = GROUPS.filter((group) => !group.parts).map((group) => {
     const onlyGiven = optional(group);
@@ -76,8 +77,8 @@ export function reportOf(name, { design, version, reference, reasons }, address)
     return rows.length ? html('table', {}, html('caption', {}, group.title), html('tbody', {}, rows)) : undefined;
   });
   const materials = GROUPS.find((group) => group.pointer === '/materials');
-  const materialRows = materials.parts.map(({ title, fields }) =>
-    html('tr', {}, html('th', {}, title), html('td', {}, fields.map((field) => shownValue(field, design)).join(', ν '))),
+  const materialRows = materials.parts.map(({ title, part, fields }) =>
+    html('tr', {}, html('th', {}, title), html('td', {}, [titleOf(materialsOf(design, part)), fields.map((field) => shownValue(field, design)).join(', ν\u00a0')].filter(Boolean).map((text, index) => [index > 0 && html('br', {}), text]).flat())),
   );
   // Few designs give them, but then up to eight: lines across the page take less of it than a table.
   const made = GROUPS.find((group) => group.pointer === '/parts');
@@ -91,9 +92,9 @@ export function reportOf(name, { design, version, reference, reasons }, address)
       'p',
       { class: 'imprint' },
       version ? t('report.calculated', { date: new Date().toISOString().slice(0, 10), version }) : t('report.printed', { date: new Date().toISOString().slice(0, 10) }),
-      reference && version ? t('report.compared', { name: reference.name }) : '',
+      reference && version ? t('report.compared', { name: reference }) : '',
       ' · ',
-      html('a', { href: address }, t('report.on_line')),
+      html('a', { href: address }, t('report.on_line', { address: address.split('#')[0] })),
     ),
     reasons.length > 0 && html('div', { class: 'report-reasons' }, html('h2', {}, sentence(reasons[0].title)), html('ul', {}, reasons.map(({ label, detail }) => html('li', {}, label ? labelled(label, detail) : detail)))),
     html('div', { class: 'report-design' }, groups.filter(Boolean), html('table', {}, html('caption', {}, materials.title), html('tbody', {}, materialRows))),

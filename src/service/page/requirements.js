@@ -1,7 +1,7 @@
 // What a drive must do, as its form asks for it, and the searches that follow: one for each kind of drive that may be, so that few numbers
 // are free in each.
 
-import { at } from './design.js';
+import { at, changed } from './design.js';
 import * as field from './field.js';
 import { number as digits } from './format.js';
 import { CONTACTS } from './motion.js';
@@ -109,6 +109,7 @@ export const GROUPS = [
       number('ratio_max', '', '', { whole: true, optional: () => t('empty.one_ratio') }),
       number('output_torque_nm', 'M_G', 'N·m', { likely: 200 }),
       number('input_speed_rpm', 'n', '1/min', { optional: () => t('empty.not_asked'), step: 100 }),
+      field.choice(`${ROOT}/cycle`, ['pulsating', 'reversed'].map((value) => ({ value, label: t(`option./load/cycle.${value}`) })), { label: t('label./load/cycle') }),
     ],
   },
   {
@@ -211,6 +212,15 @@ function required(requirements, shape) {
   };
 }
 
+/** A found design with the lower stresses that single contacts had to keep. */
+export function withAllowables(design, requirements) {
+  const lower = CONTACTS.filter(({ key }) => asked(requirements, `allowable_${key}_mpa`) !== undefined);
+  if (lower.length === 0) return design;
+  const all = asked(requirements, 'allowable_stress_mpa');
+  const stresses = CONTACTS.map(({ key }) => [key, Math.min(all, asked(requirements, `allowable_${key}_mpa`) ?? all)]);
+  return changed(design, '/load/allowable_stress_mpa', Object.fromEntries(stresses));
+}
+
 /** What is missing or cannot be, by field: `[{ pointer, detail }]`. */
 export function faultsOf(requirements) {
   const faults = [];
@@ -272,7 +282,7 @@ export function searchesOf(requirements) {
       };
       const base = {
         drive: { wave_generator: fixed, teeth: { shape: shape.name, ...(fewest === mostSlots ? { count: fewest } : {}) } },
-        load: { output_torque_nm: asked(requirements, 'output_torque_nm'), allowable_stress_mpa: asked(requirements, 'allowable_stress_mpa'), ...(speed === undefined ? {} : { input_speed_rpm: speed }) },
+        load: { output_torque_nm: asked(requirements, 'output_torque_nm'), allowable_stress_mpa: asked(requirements, 'allowable_stress_mpa'), ...(asked(requirements, 'cycle') === 'reversed' ? { cycle: 'reversed' } : {}), ...(speed === undefined ? {} : { input_speed_rpm: speed }) },
         model: shape.model,
         ...(asked(requirements, 'finger_safety') === undefined || shape.name === 'ball' ? {} : { parts: { carrier: { strength: asked(requirements, 'carrier_strength') ?? STRENGTHS[0].value } } }),
         ...(rubs ? { friction: { wave_generator: { kind: 'plain', coefficient }, ring: { coefficient }, carrier: { coefficient } } } : {}),

@@ -1,19 +1,31 @@
 // What a designer decides by, as a table: each row is one entry here. A result that the service does not answer is not shown.
 
-import { html, setProperties, setText, symbol } from './dom.js';
-import { DASH, difference, number } from './format.js';
+import { at } from './design.js';
+import { html, setAttributes, setProperties, setText, symbol } from './dom.js';
+import { DASH, difference, number, withUnit } from './format.js';
+import { unpublished } from './materials.js';
 import { CONTACTS } from './motion.js';
 import { term } from './terms.js';
 import { listed, t, textOf } from './texts.js';
 
-const row = (label, sign, unit, get, more) => ({ label, symbol: sign, unit, get, ...more });
+export const row = (label, sign, unit, get, more) => ({ label, symbol: sign, unit, get, ...more });
 
 const peakRows = (field, name, sign, unit) =>
   CONTACTS.map(({ key, name: contact, index }) =>
     row(t('result.of', { what: name, part: contact.toLowerCase() }), `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field].value, {
       place: ({ sweep }) => sweep.peaks[key][field],
+      isPast: (answers) => field === 'stress_mpa' && isOverstressed(key, answers),
     }),
   );
+
+/** The stress that a design allows at a contact, where it gives one. */
+function allowableAt(contact, { design }) {
+  const given = at(design, '/load/allowable_stress_mpa');
+  return typeof given === 'object' ? given?.[contact] : given;
+}
+
+export const isOverstressed = (contact, answers) => answers.sweep.peaks[contact].stress_mpa.value > allowableAt(contact, answers);
+export const isOverloaded = ({ sweep: { torque_capacity: capacity, load } }) => Math.abs(capacity.output_torque_nm) < Math.abs(load.output_torque_nm);
 
 /** What goes with the largest stress of each contact. */
 const contactRows = (field, name, sign, unit) =>
@@ -21,8 +33,11 @@ const contactRows = (field, name, sign, unit) =>
     row(t('result.of', { what: name, part: contact.toLowerCase() }), `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field]),
   );
 
-const least = (column) => column?.reduce((most, value) => Math.min(most, value));
-const greatest = (column) => column?.reduce((most, value) => Math.max(most, value));
+/** Outer over inner radius of a ring that has none of its own. */
+const RIM = 1.2;
+
+export const least = (column) => column?.reduce((most, value) => Math.min(most, value));
+export const greatest = (column) => column?.reduce((most, value) => Math.max(most, value));
 
 const percent = (share) => `${share > 0 ? '+' : share < 0 ? '−' : ''}${Math.abs(Math.round(100 * share))}`;
 const span = ({ low, high }) => t('result.span', { low: percent(low), high: percent(high) });
@@ -45,25 +60,10 @@ function heldAs({ sweep }) {
   return ` ${held.wind_up ? t('error.held_as_earlier', how) : t('error.held_as', how)}`;
 }
 
-/** The contact that carries the largest of a quantity. */
-function largest(field, { sweep }) {
-  if (!sweep) return undefined;
-  const peaks = CONTACTS.map(({ key, name }) => ({ name, peak: sweep.peaks[key][field] }));
-  return peaks.reduce((most, candidate) => (candidate.peak.value > most.peak.value ? candidate : most));
-}
-
-const largestRow = (label, field, unit) =>
-  row(label, '', unit, (answers) => largest(field, answers)?.peak.value, {
-    note: (answers) => {
-      const { name, peak } = largest(field, answers);
-      return t('result.peak_at', { part: name.toLowerCase(), position: number(peak.position_deg, 3) });
-    },
-  });
-
 /** Of what friction takes. */
 const lossRow = (label, sign, unit, get, more) => row(label, sign, unit, ({ sweep }) => sweep?.losses && get(sweep.losses), more);
 
-const percentRow = (label, sign, get, more) => lossRow(label, sign, '%', (losses) => { const share = get(losses); return share === undefined ? undefined : 100 * share; }, more);
+export const percentRow = (label, sign, get, more) => lossRow(label, sign, '%', (losses) => { const share = get(losses); return share === undefined ? undefined : 100 * share; }, more);
 
 const PLACES = ['wave_generator', 'ring', 'carrier', 'bearing'];
 
@@ -110,8 +110,8 @@ const backingRows = BACKINGS.map((key) => {
   });
 });
 
-const backlashOf = ({ sweep }) => sweep?.wind_up?.backlash;
-const backlashRow = (label, get) => row(label, '', 'arcmin', (answers) => backlashOf(answers) && get(backlashOf(answers)), { significant: 4 });
+export const backlashOf = ({ sweep }) => sweep?.wind_up?.backlash;
+export const backlashRow = (label, get) => row(label, '', 'arcmin', (answers) => backlashOf(answers) && get(backlashOf(answers)), { significant: 4 });
 
 const backlashRows = [
   backlashRow(t('result.backlash_mean'), ({ mean_arcmin: mean }) => mean),
@@ -120,59 +120,21 @@ const backlashRows = [
   ...CONTACTS.map(({ key, name }) => backlashRow(t('result.backlash_by', { part: name.toLowerCase() }), ({ contribution_arcmin: part }) => part[key])),
 ];
 
-const limitOf = ({ sweep: { torque_capacity: capacity } }) => (capacity.turns_past_teeth ? t('result.turns_past') : t(`result.limit.${capacity.limited_by}`));
+/** What limits the torque, and at what number. */
+export function limitOf(answers) {
+  const { turns_past_teeth: turnsPast, limited_by: limit } = answers.sweep.torque_capacity;
+  return turnsPast ? t('result.turns_past') : t(`result.limit.${limit}`, { stress: withUnit(number(allowableAt(limit, answers)), 'MPa') });
+}
 
-const heldOf = ({ sweep: { fingers } }) => t(`result.holding.${fingers.fingers}`);
+export function heldOf({ sweep: { fingers } }) {
+  const holding = t(`result.holding.${fingers.fingers}`);
+  return fingers.is_assumed ? t('result.assumed', { holding }) : holding;
+}
 
-const safetyTile = {
-  ...row(t('result.finger_safety'), '', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
-  note: (answers) => (answers.sweep.fingers.is_assumed ? t('result.assumed', { holding: heldOf(answers) }) : heldOf(answers)),
-  state: ({ sweep }) => (sweep.fingers.safety < 1 ? 'warning' : ''),
-  isOptional: true,
-};
+/** Hardened steel cracks at the notch before it yields. */
+const isHardened = ({ design }) => [at(design, '/parts/carrier/strength')].some((strength) => strength?.hardened ?? strength === '100cr6');
 
-const capacityTile = {
-  ...row(t('result.capacity'), '', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { significant: 4 }),
-  note: (answers) => t('result.capacity_limited', { limit: limitOf(answers) }),
-  isOptional: true,
-};
-
-const backlashTile = {
-  ...backlashRow(t('result.backlash'), ({ mean_arcmin: mean }) => mean),
-  note: (answers) => t('result.backlash_range', { least: number(backlashOf(answers).smallest_arcmin, 4), most: number(backlashOf(answers).largest_arcmin, 4) }),
-  state: (answers) => (backlashOf(answers).smallest_arcmin < -1e-9 ? 'warning' : ''),
-  isOptional: true,
-};
-
-/** Always in sight, however far one scrolls. */
-const KEY_ROWS = [
-  row(t('label./ratio'), '', '', ({ geometry }) => geometry?.transmission_ratio),
-  row(t('result.contact_ratio'), '', '', ({ coincidence }) => coincidence?.coincidence_degree, {
-    note: ({ coincidence }) => t('result.from_position', { position: number(coincidence.engagement.start_deg, 4) }),
-    terms: ['coincidence', 'position'],
-  }),
-  row(t('result.teeth_in_mesh'), '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, {
-    text: ({ coincidence: { teeth_in_mesh_per_zone: { min, max } } }) => (min === max ? `${min}` : t('tolerance.range', { low: min, high: max })),
-    scoped: true,
-  }),
-  largestRow(t('result.largest_force'), 'force_n', 'N'),
-  largestRow(t('result.largest_stress'), 'stress_mpa', 'MPa'),
-  percentRow(t('result.efficiency'), '', ({ efficiency }) => efficiency.ring_fixed, {
-    significant: 3,
-    note: ({ sweep: { losses } }) => (losses.self_locking ? t('result.ring_fixed_locks') : t('result.ring_fixed', { percent: number(100 * losses.efficiency.ring_fixed_back_driven, 3) })),
-    isOptional: true,
-  }),
-  capacityTile,
-  safetyTile,
-  backlashTile,
-  row(t('result.undercut'), '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
-    text: ({ geometry }) => (geometry.undercut.occurs ? t('result.yes') : t('result.no')),
-    note: ({ geometry: { undercut } }) =>
-      undercut.critical_tooth_radius_mm === undefined ? t('result.no_radius') : t('result.critical', { radius: number(undercut.critical_tooth_radius_mm, 4) }),
-    state: ({ geometry }) => (geometry.undercut.occurs ? 'warning' : 'good'),
-    keepsNote: true,
-  }),
-];
+const safetyRow = (label, sign, key, more) => row(label, sign, '', ({ sweep }) => sweep?.fingers?.[key], { significant: 3, isPast: ({ sweep }) => sweep.fingers[key] < 1, ...more });
 
 export const GROUPS = [
   {
@@ -182,11 +144,11 @@ export const GROUPS = [
   },
   {
     title: t('result.group.capacity'),
-    told: ({ sweep }) => (sweep?.torque_capacity && sweep.fingers?.safety === undefined ? t('result.contacts_only') : ''),
+    told: ({ design, sweep }) => (sweep?.torque_capacity ? [...unpublished(design), sweep.fingers?.safety === undefined && t('result.contacts_only')].filter(Boolean).join(' ') : ''),
     offer: '/load/allowable_stress_mpa',
     rows: [
       row(t('label./load/input_torque_nm'), 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
-      row(t('label./load/output_torque_nm'), 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm),
+      row(t('label./load/output_torque_nm'), 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { isPast: isOverloaded }),
       row(t('result.limited_by'), '', '', ({ sweep }) => sweep?.torque_capacity?.limited_by, {
         text: limitOf,
       }),
@@ -197,9 +159,10 @@ export const GROUPS = [
     title: t('result.group.fingers'),
     offer: '/parts/carrier/strength',
     rows: [
-      row(t('result.safety'), 'S', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
-      row(t('result.yield_safety'), 'S_F', '', ({ sweep }) => sweep?.fingers?.yield_safety, { significant: 3 }),
-      row(t('result.fatigue_safety'), 'S_D', '', ({ sweep }) => sweep?.fingers?.fatigue_safety, { significant: 3 }),
+      safetyRow(t('result.safety'), 'S', 'safety'),
+      safetyRow(t('result.yield_safety'), 'S_F', 'yield_safety', { name: (answers) => (isHardened(answers) ? t('result.yield_safety_hardened') : t('result.yield_safety')) }),
+      safetyRow(t('result.fatigue_safety'), 'S_D', 'fatigue_safety'),
+      row(t('result.nominal_stress'), 'σ', 'MPa', ({ sweep }) => sweep?.fingers?.nominal_stress_mpa, { significant: 4 }),
       row(t('result.foot_stress'), 'σ', 'MPa', ({ sweep }) => sweep?.fingers?.stress_mpa, { significant: 4 }),
       row(t('result.support'), '', '', ({ sweep }) => sweep?.fingers?.stress_mpa, { text: heldOf }),
       row(t('result.load_along_tooth'), 'κ', '', ({ sweep }) => sweep?.fingers?.load_peak_over_mean, { significant: 3 }),
@@ -232,8 +195,8 @@ export const GROUPS = [
       row(t('result.contact_ratio_all'), 'ε', '', ({ coincidence }) => coincidence?.coincidence_degree, { significant: 7, terms: ['coincidence'] }),
       row(t('result.mesh_fewest'), '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.min, { scoped: true }),
       row(t('result.mesh_most'), '', '', ({ coincidence }) => coincidence?.teeth_in_mesh_per_zone.max, { scoped: true }),
-      row(t('result.carrying_fewest'), '', '', ({ sweep }) => sweep?.carrying_teeth?.min, { scoped: true }),
-      row(t('result.carrying_most'), '', '', ({ sweep }) => sweep?.carrying_teeth?.max, { scoped: true }),
+      row(t('result.carrying_fewest'), '', '', ({ sweep }) => sweep?.loaded_teeth_per_zone.min, { scoped: true }),
+      row(t('result.carrying_most'), '', '', ({ sweep }) => sweep?.loaded_teeth_per_zone.max, { scoped: true }),
       row(t('result.engagement'), 'ψ_e', 'deg', ({ geometry }) => geometry?.engagement.start_deg, { terms: ['position'] }),
       row(t('result.undercut'), '', '', ({ geometry }) => geometry && Number(geometry.undercut.occurs), {
         text: ({ geometry }) => (geometry.undercut.occurs ? t('result.yes') : t('result.no')),
@@ -244,6 +207,7 @@ export const GROUPS = [
   {
     title: t('result.group.sizes'),
     rows: [
+      row(t('quantity.outer_diameter_mm'), '', 'mm', ({ design, geometry }) => geometry && 2 * (at(design, '/parts/ring/outer_radius_mm') ?? RIM * (geometry.ring.root_radius_mm + (at(design, '/parts/ring/clearance_um') ?? 0) / 1000))),
       row(t('result.root_radius'), '', 'mm', ({ geometry }) => geometry?.ring.root_radius_mm),
       row(t('result.tip_radius'), '', 'mm', ({ geometry }) => geometry?.ring.tip_radius_mm),
       row(t('result.tooth_height'), '', 'mm', ({ geometry }) => geometry?.ring.tooth_height_mm),
@@ -283,16 +247,23 @@ export const GROUPS = [
 ];
 
 /** What a count of teeth is over: where zones are unlike, over all of them. */
-const scopeOf = ({ scoped }, { zones }) => (scoped ? (zones?.areAlike === false ? t('result.all_zones') : t('result.each_zone')) : '');
+export const scopeOf = ({ scoped }, { zones }) => (scoped ? (zones?.areAlike === false ? t('result.all_zones') : t('result.each_zone')) : '');
 
-function show(entry, answers) {
+export function show(entry, answers) {
   const value = entry.get(answers);
   if (value === undefined) return undefined;
   const text = entry.text?.(answers) ?? number(value, entry.significant ?? 5);
-  return { value, text };
+  return { value, text, state: entry.isPast?.(answers) ? 'problem' : (entry.state?.(answers) ?? '') };
 }
 
-function compare(entry, answers, reference) {
+/** A value in its element; what is beyond its limit is marked. */
+export function write(element, shown) {
+  setText(element, shown?.text ?? DASH);
+  setProperties(element.dataset, { state: shown?.state ?? '' });
+  if (shown) setProperties(element, { value: String(shown.value) });
+}
+
+export function compare(entry, answers, reference) {
   const value = entry.get(answers);
   const other = entry.get(reference);
   if (value === undefined || other === undefined || entry.noDifference) return '';
@@ -302,23 +273,18 @@ function compare(entry, answers, reference) {
 
 export class Results {
   #cells = [];
-  #tiles = [];
   #offers = [];
   #told = [];
 
   /** `onShow({ input_angle_deg, position_deg })` when a peak's place is picked, `onAsk(pointer)` when a result is wanted that the
    *  design has to ask for, `onTake({ pointer, value })` when an estimate is taken over into the design. */
-  constructor({ keyFigures, table }, onShow, onAsk, onTake) {
-    for (const entry of KEY_ROWS) {
-      const value = html('data', { class: 'value number' });
-      const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
-      const note = html('span', { class: 'tile-note number' });
-      const scope = entry.scoped && html('span');
-      const tile = html('div', { class: 'tile', hidden: Boolean(entry.isOptional) }, html('dt', {}, html('span', {}, entry.label, scope), entry.terms && term(...entry.terms)), html('dd', {}, value, unit && [' ', unit], note));
-      this.#tiles.push({ entry, tile, value, note, scope });
-      keyFigures.append(tile);
-    }
+  constructor({ table, more }, onShow, onAsk, onTake) {
     this.table = table;
+    more.addEventListener('click', () => {
+      const isAll = table.classList.toggle('all');
+      setAttributes(more, { 'aria-expanded': isAll });
+      setText(more, isAll ? t('results.less') : t('results.more'));
+    });
     const head = html('tr', {}, html('th', { scope: 'col' }, t('result.result')), html('th', { scope: 'col', class: 'numeric' }, t('comparison.this_design')));
     this.headings = [t('comparison.reference'), t('comparison.difference')].map((text) => html('th', { scope: 'col', class: 'numeric compared' }, text));
     head.append(...this.headings, html('th', { scope: 'col' }, t('result.where')));
@@ -338,15 +304,16 @@ export class Results {
         const delta = html('td', { class: 'numeric compared number' });
         const place = entry.place && html('button', { type: 'button', class: 'link number', title: t('result.show') });
         const scope = entry.scoped && html('span');
+        const name = html('span', {}, entry.label);
         const taken = entry.taken && html('button', { type: 'button', class: 'link number', 'aria-label': t('result.take_over_as', { what: entry.label }) });
-        const cell = { entry, taken, scope, value, unit, reference, referenceUnit, delta, place };
+        const cell = { entry, name, taken, scope, value, unit, reference, referenceUnit, delta, place };
         place?.addEventListener('click', () => onShow(cell.at));
         taken?.addEventListener('click', () => onTake(entry.taken(cell.answers)));
         const kind = entry.text ? 'numeric words' : 'numeric';
         const line = html(
           'tr',
           { class: group.isOnScreenAlone ? 'unasked' : entry.followsFromRatio ? 'follows' : '' },
-          html('th', { scope: 'row' }, entry.label, scope, entry.symbol && [' ', symbol(entry.symbol)], entry.terms && [' ', term(...entry.terms)]),
+          html('th', { scope: 'row' }, name, scope, entry.symbol && [' ', symbol(entry.symbol)], entry.terms && [' ', term(...entry.terms)]),
           html('td', { class: kind }, value, unit),
           html('td', { class: `${kind} compared` }, reference, referenceUnit),
           [delta, html('td', { class: 'place' }, place ?? taken)],
@@ -358,28 +325,8 @@ export class Results {
     }
   }
 
-  #noteOf(entry, answers, reference) {
-    if (!reference || entry.keepsNote) return entry.note?.(answers) ?? '';
-    const difference = compare(entry, answers, reference);
-    return difference === t('result.differs') ? t('result.reference', { value: entry.text(reference) }) : difference;
-  }
-
-  /** Shows answers in the tiles and the table, and beside them those of a reference. What has no answer keeps its place but no number; `isHeld`
-   *  says that no tile or row may go, because a slider is held. */
-  updateKeyFigures(answers, reference, isHeld) {
-    for (const { entry, tile, value, note, scope } of this.#tiles) {
-      if (scope) setText(scope, scopeOf(entry, answers));
-      const shown = show(entry, answers);
-      // What a design need not ask for takes no room where it does not.
-      setProperties(tile, { hidden: Boolean(entry.isOptional) && !shown && (tile.hidden || !isHeld) });
-      setText(value, shown?.text ?? DASH);
-      if (shown) setProperties(value, { value: String(shown.value) });
-      setProperties(tile.dataset, { state: (shown && entry.state?.(answers)) ?? '' });
-      setText(note, shown ? this.#noteOf(entry, answers, reference) : '');
-    }
-  }
-
-  updateTable(answers, reference, isHeld) {
+  /** Shows answers, and beside them those of a reference; `isHeld` says that no row may go, because a slider is held. */
+  update(answers, reference, isHeld) {
     this.table.classList.toggle('comparing', Boolean(reference));
     for (const { group, offer, heading } of this.#offers) {
       const isAnswered = (given) => given && group.rows[0].get(given) !== undefined;
@@ -388,14 +335,14 @@ export class Results {
       heading.classList.toggle('unasked', !isAnswered(answers) && !isAnswered(reference));
     }
     for (const { group, told } of this.#told) setText(told, group.told(answers));
-    for (const { entry, scope } of this.#cells) if (scope) setText(scope, scopeOf(entry, answers));
     for (const cell of this.#cells) {
-      const { entry, line, value, unit, reference: other, referenceUnit, delta, place } = cell;
+      const { entry, name, scope, line, value, unit, reference: other, referenceUnit, delta, place } = cell;
       const shown = show(entry, answers);
       const otherShown = reference && show(entry, reference);
       setProperties(line, { hidden: !shown && !otherShown && (line.hidden || !isHeld) });
-      setText(value, shown?.text ?? DASH);
-      if (shown) setProperties(value, { value: String(shown.value) });
+      if (scope) setText(scope, scopeOf(entry, answers));
+      if (entry.name && shown) setText(name, entry.name(answers));
+      write(value, shown);
       setText(other, otherShown?.text ?? DASH);
       if (unit) {
         setText(unit, shown ? entry.unit : '');

@@ -76,7 +76,7 @@ export async function evaluate(design, signal) {
   const { answer, problem, solveMs } = await ask('v1/design', drawn, { signal, kind: 'design' });
   const { geometry, coincidence_degree: coincidence, sweep, problems = {} } = answer ?? {};
   const told = problem ? [problem] : Object.values(problems).map(problemInWords);
-  return { design, answers: { zones: zonesOf(design), geometry, coincidence, sweep }, problems: told, solveMs: solveMs ?? 0 };
+  return { design, answers: { design, zones: zonesOf(design), geometry, coincidence, sweep }, problems: told, solveMs: solveMs ?? 0 };
 }
 
 /** Documents that came or are under way, and how long the others are waited for. */

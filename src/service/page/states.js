@@ -5,19 +5,6 @@ import { CONTACTS, enteringBetween, framesOf } from './motion.js';
 /** Most states that are drawn as they are: two plots with some thousands of points each. */
 const MOST_STATES = 6000;
 
-/** Of each frame, how many teeth carry: `{ min, max }`, where the service tells them from those that only mesh. */
-function carrying({ loaded }, frames) {
-  if (!loaded) return undefined;
-  let [min, max] = [Infinity, 0];
-  for (const { start, end } of frames) {
-    let count = 0;
-    for (let row = start; row < end; row += 1) count += loaded[row] ? 1 : 0;
-    min = Math.min(min, count);
-    max = Math.max(max, count);
-  }
-  return { min, max };
-}
-
 /** The sweep whose states have, at each contact, the stress times the slip: pressure times velocity but for the speed. */
 function withRubbing(sweep) {
   const { states, losses } = sweep;
@@ -31,15 +18,14 @@ function withRubbing(sweep) {
   return { ...sweep, states: { ...states, ...Object.fromEntries(rubbing) }, losses: others };
 }
 
-/** The sweep with `carrying_teeth`, and with so few states that they can be drawn: every so many input angles, both sides of each jump,
+/** The sweep with so few states that they can be drawn: every so many input angles, both sides of each jump,
  *  and the angles of the peaks. What the table shows stays that of all states. */
 export function drawable(answer) {
   const sweep = withRubbing(answer);
   const { states, peaks } = sweep;
   const frames = framesOf(states);
-  const whole = { ...sweep, carrying_teeth: carrying(states, frames) };
   const stride = Math.ceil(states.tooth.length / MOST_STATES);
-  if (stride <= 1) return whole;
+  if (stride <= 1) return sweep;
   const last = frames.length - 1;
   const peakAngles = new Set(Object.values(peaks).flatMap(({ force_n: force, stress_mpa: stress }) => [force.input_angle_deg, stress.input_angle_deg]));
   for (const { input_angle_deg: angle } of Object.values(sweep.losses?.pressure_velocity_mpa_m_per_s ?? {})) peakAngles.add(angle);
@@ -53,5 +39,5 @@ export function drawable(answer) {
   const rowsOf = ({ start, end }) => Array.from({ length: end - start }, (_, row) => start + row);
   const rows = [...kept].sort((one, other) => one - other).flatMap((index) => rowsOf(frames[index]));
   const thinned = Object.fromEntries(Object.entries(states).map(([name, column]) => [name, rows.map((row) => column[row])]));
-  return { ...whole, states: thinned };
+  return { ...sweep, states: thinned };
 }

@@ -24,9 +24,9 @@ export class Status {
   }
 
   /** `kept` says what stands in place of the answers that there are none of. */
-  show({ reasons, findings }, kept) {
+  show({ reasons, findings, assumptions }, kept) {
     this.#showReasons(reasons, kept);
-    this.#showFindings(findings, reasons.length > 0);
+    this.#showFindings(findings, reasons.length > 0, assumptions);
     this.#announceLater(reasons, findings);
   }
 
@@ -43,11 +43,11 @@ export class Status {
   }
 
   /** What is told where there is nothing wrong. */
-  #showFindings(findings, hasReasons) {
+  #showFindings(findings, hasReasons, assumptions) {
     const line = byId('status-findings');
     setProperties(line, { hidden: hasReasons });
-    setText(line, findings.length === 0 ? t('status.no_findings') : labelled(counted('status.findings', findings.length), listed(findings.map(titleOf))));
-    setProperties(line, { className: findings.some(({ severity }) => severity === 'warning') ? 'warning' : '' });
+    setText(line, findings.length === 0 ? assumptions.join(' ') || t('status.no_findings') : labelled(counted('status.findings', findings.length), listed(findings.map(titleOf))));
+    setProperties(line, { className: ['problem', 'warning'].find((wanted) => findings.some(({ severity }) => severity === wanted)) ?? '' });
   }
 
   #announceLater(reasons, findings) {

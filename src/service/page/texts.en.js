@@ -8,7 +8,7 @@ import { STUDIES } from './texts.studies.en.js';
 export const SERVICE = {};
 
 const PAGE = {
-  list: { comma: ', ', semicolon: '; ', and: ' and ', stop: '.', labelled: '{label}: {text}' },
+  list: { comma: ', ', semicolon: '; ', and: ' and ', or: ' or ', stop: '.', labelled: '{label}: {text}' },
   part: { wave_generator: 'Wave generator', teeth: 'Teeth', ring: 'Ring', carrier: 'Carrier' },
   page: {
     subtitle: 'Discrete-tooth harmonic drives',
@@ -92,7 +92,7 @@ const PAGE = {
   },
   intro: {
     title: 'A discrete-tooth harmonic drive',
-    text: 'A wave generator, here an ellipse, pushes loose teeth outward in the slots of a carrier. The flanks of a fixed ring turn this into a slow, strong rotation of the carrier. Change the design, and see how it moves, what each tooth carries and what to check.',
+    text: 'A wave generator, in the picture an ellipse, pushes loose teeth outward in the slots of a carrier. The flanks of a fixed ring turn this into a slow, strong rotation of the carrier. Change the design, and see how it moves, what each tooth carries and what to check.',
     hide: 'Hide this',
     picture: 'Section through a drive: in the middle the elliptic wave generator, around it teeth in the slots of the carrier, outside the ring',
     ring: 'stands still',
@@ -110,6 +110,7 @@ const PAGE = {
     waiting: 'Waiting for the calculation service…',
     slow: 'Calculating for {seconds} s. The numbers are those of the last design.',
     no_findings: 'No findings',
+    all_results: 'All results',
     findings: { one: '1 finding', many: '{count} findings' },
     geometry_only: 'Geometry is shown; forces are not.',
     last_design: 'The last possible design stays in the picture.',
@@ -122,6 +123,7 @@ const PAGE = {
     clear: 'Clear reference',
     differing: 'Inputs that differ: {list}.',
     same: 'All inputs are the same.',
+    named: '{name}, with {label} {value}',
     caption: 'Inputs that differ from the reference',
     input: 'Input',
     this_design: 'This design',
@@ -150,6 +152,7 @@ const PAGE = {
     loaded: 'ψ {position}°, σ up to {stress} MPa',
     unloaded: 'ψ {position}°, no load',
     angle_in_words: '{input} degrees, carrier {carrier} degrees',
+    carrier: 'Carrier, with a finger between each two slots',
     coloured_by: 'Teeth are coloured by',
     highest: 'Tooth’s highest {name}',
     zones: 'Meshing zones',
@@ -191,6 +194,7 @@ const PAGE = {
     title: 'Results',
     table: 'Table of results',
     more: 'More: stress below the surface, estimates, checks',
+    less: 'Less',
     solved: 'Solver {version}, solved in {ms} ms',
   },
   losses: {
@@ -240,7 +244,8 @@ const PAGE = {
     calculated: 'Calculated {date} by toothwave {version}',
     printed: 'Printed {date} by toothwave',
     compared: '; compared with the reference {name}',
-    on_line: 'this design on line',
+    on_line: 'this design at {address}',
+    symbols: 'ψ: position of a tooth, from the middle of a lobe. j: input angle. Indices: H wave generator, K ring, S slot, G carrier.',
     list: '{count}, {least} to {most}',
     list_of_one: '{count}, {most}',
     finding: 'Finding',
@@ -260,9 +265,17 @@ const PAGE = {
     intro: 'Show the introduction',
   },
   term: {
+    paper: {
+      title: 'The paper',
+      text: 'Wang Su, Bai Xin, Chen Shixian, Wang Chunyan: Research on analysis of force and contacting stress for the discrete teeth harmonic drives. Journal of Chongqing University 36(1), 2013, 35–42 (in Chinese).',
+    },
+    finger: {
+      title: 'Finger',
+      text: 'The part of the carrier between two slots. The teeth in the slots press on it, so it bends; it can yield or crack at its foot.',
+    },
     coincidence: {
       title: 'Contact ratio ε',
-      text: 'The paper’s coincidence degree: how many teeth touch the ring’s flanks at once, on average over a turn and in all meshing zones together. More teeth share the load.',
+      text: 'How many teeth touch the ring’s flanks at once, on average over a turn and in all meshing zones together. The paper by Wang Su and others (2013) calls it coincidence degree.',
     },
     position: {
       title: 'Position ψ',
@@ -278,7 +291,7 @@ const PAGE = {
     },
     projection: {
       title: 'Projection',
-      text: 'How the paper adds up the approaches of a tooth’s contacts: each approach is projected on the direction of the wave generator’s force. With it the answers are those of the paper.',
+      text: 'How the paper by Wang Su and others (2013) adds up the approaches of a tooth’s contacts: each approach is projected on the direction of the wave generator’s force. With it the answers are those of the paper.',
     },
     virtual_work: {
       title: 'Virtual work',
@@ -295,10 +308,6 @@ const PAGE = {
     pressure_velocity: {
       title: 'Pressure times velocity p·v',
       text: 'The largest contact pressure of a tooth times the speed at which it slips there. Limits in handbooks are for the load over the projected area, which is far smaller. Do not compare them with this value.',
-    },
-    paper: {
-      title: 'The paper',
-      text: 'Wang Su, Bai Xin, Chen Shixian, Wang Chunyan: Research on analysis of force and contacting stress for the discrete teeth harmonic drives. Journal of Chongqing University 36(1), 2013, 35–42 (in Chinese).',
     },
   },
 };

@@ -7,7 +7,7 @@ import { STUDIES } from './texts.studies.zh-cn.js';
 export { SERVICE } from './service.zh-cn.js';
 
 const PAGE = {
-  list: { comma: '，', semicolon: '；', and: '和', stop: '。', labelled: '{label}：{text}' },
+  list: { comma: '，', semicolon: '；', and: '和', or: '或', stop: '。', labelled: '{label}：{text}' },
   part: { wave_generator: '波发生器', teeth: '离散齿', ring: '刚轮', carrier: '离散齿体' },
   page: {
     subtitle: '离散齿谐波传动',
@@ -91,7 +91,7 @@ const PAGE = {
   },
   intro: {
     title: '离散齿谐波传动',
-    text: '波发生器（此处为椭圆）把离散齿在离散齿体的槽中向外推，固定的刚轮的齿廓使离散齿体缓慢而有力地转动。离散齿又称活齿。请修改设计，观察其运动、各齿的载荷以及需要检查之处。',
+    text: '波发生器（图中为椭圆）把离散齿在离散齿体的槽中向外推，固定的刚轮的齿廓使离散齿体缓慢而有力地转动。离散齿又称活齿。请修改设计，观察其运动、各齿的载荷以及需要检查之处。',
     hide: '隐藏简介',
     picture: '传动剖面图：中间为椭圆波发生器，其外为离散齿体槽中的离散齿，最外为刚轮',
     ring: '固定',
@@ -105,6 +105,7 @@ const PAGE = {
     waiting: '正在等待计算服务…',
     slow: '已计算 {seconds} s；数值仍是上一个设计的。',
     no_findings: '没有提示',
+    all_results: '全部结果',
     findings: { one: '1 条提示', many: '{count} 条提示' },
     geometry_only: '显示几何结果，不显示受力。',
     last_design: '图中保留上一个可行的设计。',
@@ -117,6 +118,7 @@ const PAGE = {
     clear: '取消参考',
     differing: '不同的输入：{list}。',
     same: '全部输入相同。',
+    named: '{name}（{label} {value}）',
     caption: '与参考设计不同的输入',
     input: '输入',
     this_design: '本设计',
@@ -145,6 +147,7 @@ const PAGE = {
     loaded: 'ψ {position}°，σ 最大 {stress} MPa',
     unloaded: 'ψ {position}°，不承载',
     angle_in_words: '{input} 度，离散齿体 {carrier} 度',
+    carrier: '离散齿体，每两槽之间为一个指',
     coloured_by: '离散齿的着色依据',
     highest: '离散齿的最大{name}',
     zones: '啮合区',
@@ -182,7 +185,7 @@ const PAGE = {
     slot_axis: '齿心到轴线的距离，mm',
   },
   findings: { title: '提示', none: '本设计没有需要提示之处。', reasons_first: '请先解决设计不可能实现的原因。' },
-  results: { title: '计算结果', table: '结果表', more: '更多：表层以下应力、估算值、校核', solved: '求解器 {version}，用时 {ms} ms' },
+  results: { title: '计算结果', table: '结果表', more: '更多：表层以下应力、估算值、校核', less: '收起', solved: '求解器 {version}，用时 {ms} ms' },
   losses: {
     title: '凸轮、套圈或轴承',
     intro: '离散齿直接接触凸轮、接触带轴承的套圈、接触齿处无摩擦的套圈时的摩擦损失。点击一行即采用。',
@@ -230,7 +233,8 @@ const PAGE = {
     calculated: 'toothwave {version} 计算，{date}',
     printed: 'toothwave 打印，{date}',
     compared: '；与参考设计 {name} 比较',
-    on_line: '在线查看本设计',
+    on_line: '本设计：{address}',
+    symbols: 'ψ：离散齿的位置角（自波的中线）。j：输入角。下标：H 波发生器，K 刚轮，S 槽，G 离散齿体。',
     list: '{count} 项，{least} 至 {most}',
     list_of_one: '{count} 项，{most}',
     finding: '提示',
@@ -250,16 +254,17 @@ const PAGE = {
     intro: '显示简介',
   },
   term: {
+    paper: { title: '论文', text: 'Wang Su、Bai Xin、Chen Shixian、Wang Chunyan：“Research on analysis of force and contacting stress for the discrete teeth harmonic drives”（中文论文），《重庆大学学报》36(1)，2013，35–42。' },
+    finger: { title: '指', text: '离散齿体上两槽之间的部分。槽中的离散齿压在指上，使其弯曲；指可能在指根处屈服或开裂。' },
     coincidence: { title: '重合度 ε', text: '同时接触刚轮齿廓的离散齿数，取一周的平均值，合计全部啮合区。齿数越多，每齿分担的载荷越小。' },
     position: { title: '啮合位置角 ψ', text: '离散齿的位置，以相对波发生器一个波的中线（椭圆为长轴）的角度表示。ψ = 0° 时离散齿被推到最外，位于刚轮齿根；它在 ψ_e 处啮入刚轮齿廓，最远在两波之间的波谷，椭圆为 90°。' },
     lobes: { title: '波数 U', text: '波发生器转一周把离散齿向外推的次数：椭圆两次，偏心圆一次。离散齿体槽数与刚轮齿数之差等于波数；改变波数时页面随之改变刚轮齿数。' },
     slots: { title: '理论槽数 Z_G', text: '决定传动比的槽数，与刚轮齿数之差等于波数。实际加工并装齿的可以是全部槽，也可以每隔一个、两个等（抽齿）。' },
-    projection: { title: '投影', text: '论文叠加一个离散齿各接触变形的方法：把每个接触变形投影到波发生器作用力的方向。采用它可得到论文的结果。' },
+    projection: { title: '投影', text: '2013 年《重庆大学学报》的论文叠加一个离散齿各接触变形的方法：把每个接触变形投影到波发生器作用力的方向。采用它可得到论文的结果。' },
     virtual_work: { title: '虚功', text: '离散齿可自由就位时的无摩擦解：每个接触变形按该处的力加权。它只由力学得出。' },
     race: { title: '套圈', text: '套在凸轮外、可自由转动的圈：被凸轮撑弯的薄壁轴承的套圈，或本身就是偏心轮的轴承的套圈。离散齿直接在凸轮上时以接近凸轮的速度滑动；套圈则几乎与齿一起静止，以轴承的小摩擦代替齿的摩擦。' },
     wear: { title: '磨损率', text: '表面损失的体积与力和滑动距离之积的比（Archard），须对具体的材料配对和润滑实测。由它得到各零件磨损最大处每小时的磨损深度。' },
     pressure_velocity: { title: 'p·v 值', text: '离散齿的最大接触压力与该处滑动速度之积。手册中的限值针对载荷与投影面积之比，要小得多，不能与此比较。' },
-    paper: { title: '论文', text: 'Wang Su、Bai Xin、Chen Shixian、Wang Chunyan：“Research on analysis of force and contacting stress for the discrete teeth harmonic drives”（中文论文），《重庆大学学报》36(1)，2013，35–42。' },
   },
 };
 

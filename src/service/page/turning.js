@@ -90,16 +90,17 @@ export class Turning {
     return ((this.inputDeg % 360) + 360) % 360;
   }
 
+  /** Whole turns count, so that the angles of both shafts have the ratio. */
   get angleInWords() {
-    return `${fixed(this.#inTurn, 1)}°`;
+    return `${fixed(this.inputDeg, 1)}°`;
   }
 
   /** Writes angles and the selected tooth; `loaded` are the loaded teeth. */
   show(loaded) {
     const angle = byId('angle');
     if (Number(angle.value) !== Math.round(this.#inTurn * 10) / 10) angle.value = this.#inTurn;
-    const carrierDeg = this.#motion.carrierDeg(this.inputDeg) % 360;
-    setAttributes(angle, { 'aria-valuetext': t('mechanism.angle_in_words', { input: fixed(this.#inTurn, 1), carrier: fixed(carrierDeg, 2) }) });
+    const carrierDeg = this.#motion.carrierDeg(this.inputDeg);
+    setAttributes(angle, { 'aria-valuetext': t('mechanism.angle_in_words', { input: fixed(this.inputDeg, 1), carrier: fixed(carrierDeg, 2) }) });
     setText(byId('angle-input'), this.angleInWords);
     setText(byId('angle-carrier'), `${fixed(carrierDeg, 2)}°`);
     setText(byId('tooth-name'), t('mechanism.tooth', { tooth: this.selected }));
