@@ -6,7 +6,7 @@ mod capacity;
 mod overhang;
 mod strength;
 
-pub use beam::{FingerBeam, Fingers, Foot};
+pub use beam::{FOOT_IN_DISC, FingerBeam, Fingers};
 pub use capacity::Limited;
 pub use overhang::{Overhang, slice_compliance_mm2_per_n};
 pub use strength::{LoadCycle, Safety, Strength, stress_concentration};

@@ -109,18 +109,6 @@ class Body:
         place = self.basis.doflocs[:, axial]
         return abs(float(np.sum(force[axial] * (self.normal[0] * (place[0] - place[0].mean()) + self.normal[1] * place[1]))))
 
-    def foot(self, u, moment, shear):
-        """Rotation and displacement of the section at the disc, for M/(E' t² h) and for Q/(E' h)."""
-        mesh, finger = self.mesh, self.finger
-        middle = mesh.p[:, mesh.facets].mean(axis=1)
-        is_within = (middle[0] > finger.inner_mm) & (middle[0] < finger.outer_mm) & (np.abs(middle[1]) < finger.half_thickness(middle[0]))
-        is_foot = is_within & (np.abs(mesh.p[2, mesh.facets]).max(axis=0) < 1e-9)
-        section = FacetBasis(mesh, ElementVector(ElementHexS2()), facets=np.flatnonzero(is_foot), intorder=4)
-        turn = asm(LinearForm(lambda v, w: v[2] * w.x[1]), section) @ u / np.sum(section.dx * section.global_coordinates()[1] ** 2)
-        shift = asm(LinearForm(lambda v, w: sum(self.normal[i] * v[i] for i in range(2))), section) @ u / np.sum(section.dx)
-        plate_mpa, thickness, height = E_MPA / (1 - NU**2), finger.thickness_mm, finger.outer_mm - finger.inner_mm
-        return {"foot_turn": float(turn * plate_mpa * thickness**2 * height / moment), "foot_shift": float(shift * plate_mpa * height / shear)}
-
 
 def at_one_end(finger, slabs):
     # Finer towards the foot, where the load is largest.
@@ -138,8 +126,7 @@ def at_one_end(finger, slabs):
     return {
         "compliance_mm_per_n": float(even @ flexibility @ even),
         "load_peak_over_mean": float(pressures.max() * finger.length_mm),
-        "moment_over_force_length": (moment := body.moment_at_foot(total, forces @ loads)) / finger.length_mm,
-        **body.foot(total, moment, 1.0),
+        "moment_over_force_length": body.moment_at_foot(total, forces @ loads) / finger.length_mm,
     }
 
 
@@ -149,8 +136,7 @@ def at_both_ends(finger, slabs):
     u = body.solve(load)
     mean = (np.diff(body.z) / body.z[-1]) @ body.means() @ u
     # One newton is on half of the finger here.
-    moment = body.moment_at_foot(u, load)
-    return {"compliance_mm_per_n": float(mean) / 2, "moment_over_force_length": moment / 2 / finger.length_mm, **body.foot(u, moment, 1.0)}
+    return {"compliance_mm_per_n": float(mean) / 2, "moment_over_force_length": body.moment_at_foot(u, load) / 2 / finger.length_mm}
 
 
 def main():

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::violation::Modified;
-use toothwave_solver::{Compatibility, Deviations, LoadCase, Parameter, Part, PerContact, Violation, model_error};
+use toothwave_solver::{Compatibility, Deviations, Parameter, Part, PerContact, Violation, model_error};
 
 use super::{
     ClearanceDocument, Design, DriveDocument, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
