@@ -1181,8 +1181,8 @@ test('long report has two readable pages with every finding', async () => {
     for (const { code } of findings) codes.add(code);
     assert.equal(await pagesOfReport(), 2, `${findings.length} findings`);
     const { table, parts, clearances, wanted, tooSmall, tooWide } = await onPaper(async (found) => {
-      const { kindOf } = await import('/page/findings.js');
-      const { findingInWords, sentence } = await import('/page/words.js');
+      const { findingsOf, kindOf } = await import('/page/findings.js');
+      const { sentence } = await import('/page/words.js');
       const { number, withUnit } = await import('/page/format.js');
       const small = [];
       const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT, (node) =>
@@ -1196,11 +1196,11 @@ test('long report has two readable pages with every finding', async () => {
         table: document.querySelector('#findings-table').innerText,
         parts: document.querySelector('.report-parts').innerText.match(/\d+(\.\d+)?/g).map(Number),
         clearances: [...document.querySelectorAll('.report-design tr')].filter((row) => row.innerText.startsWith('Clearance of')).map((row) => Number.parseFloat(row.lastChild.innerText)),
-        wanted: found.map((finding) => [
+        wanted: findingsOf({ sweep: { findings: found } }).map((finding) => [
           kindOf(finding),
           withUnit(number(finding.value, 5), finding.unit),
           withUnit(number(finding.limit, 5), finding.unit),
-          sentence(findingInWords(finding).advice),
+          sentence(finding.advice),
         ]),
         tooSmall: small,
         tooWide: [...document.querySelectorAll('table')].filter((candidate) => candidate.getBoundingClientRect().right > innerWidth).map(({ id }) => id),
