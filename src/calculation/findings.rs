@@ -102,7 +102,7 @@ impl Text {
                 "mm",
                 if is_grave {
                     format!(
-                        "the moving teeth cut away the tips of the ring's teeth: they start to touch the flank only {starts_deg:.4} deg from {lobe}, fewer of them mesh, and loads jump when one enters unless corners carry"
+                        "the moving teeth cut away the tips of the ring's teeth: they start to touch the flank only {starts_deg:.4} deg from {lobe}, fewer of them mesh, and loads jump when one enters, except with contact at tip corners (`corner_contact`)"
                     )
                 } else {
                     "the ring's tooth tips would be undercut, but the bore takes more away than undercut does".into()
@@ -113,7 +113,7 @@ impl Text {
                 &[TIP_RADIUS],
                 "mm",
                 format!(
-                    "the bore ends the flank before its natural tip: teeth start to touch it {starts_deg:.4} deg from {lobe} and take load at once, so loads jump unless corners carry"
+                    "the bore ends the flank before its natural tip: teeth start to touch it {starts_deg:.4} deg from {lobe} and take load at once, so loads jump, except with contact at tip corners (`corner_contact`)"
                 ),
                 "if the jump matters, use a smaller bore or none",
             ),
@@ -204,15 +204,15 @@ impl Text {
             Code::SlenderFingers => text(
                 &["/parts/carrier/fingers", "/model/series_compliance_mm_per_n/carrier", WIDTH],
                 "",
-                "the carrier's fingers, whose far ends a ring joins unless `parts` specifies another support, bend under their teeth: by an estimate they add this share to what a tooth gives way at its contacts, and forces and wind-up leave it out",
+                "the carrier's fingers, whose far ends a ring joins unless `parts` specifies another support, bend under their teeth. Estimate: they add this share to the deflection at a tooth's contacts. Forces and wind-up leave it out",
                 "give the estimate as the carrier's series compliance, hold the fingers at both ends, or make them shorter or thicker",
             ),
             Code::SoftRim => text(
                 &["/parts/ring/rim", "/parts/ring/outer_radius_mm", "/model/series_compliance_mm_per_n/ring"],
                 "",
                 format!(
-                    "the ring's rim, {}: by an estimate it adds this share to what a tooth gives way at its contacts, and forces and wind-up leave it out",
-                    if is_grave { "with nothing around it, bends" } else { "even if housed, gives way" }
+                    "the ring's rim, {}: estimate: it adds this share to the deflection at a tooth's contacts. Forces and wind-up leave it out",
+                    if is_grave { "without a housing, bends" } else { "even if housed, gives way" }
                 ),
                 if is_grave {
                     "house the ring or make its rim thicker, or give the estimate as the ring's series compliance"
