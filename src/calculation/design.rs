@@ -314,6 +314,17 @@ impl Design {
         Ok(violations)
     }
 
+    /// Returns the conflict of two fields that set the same quantity, whether or not an answer needs it.
+    pub fn conflict(&self) -> Option<Fault> {
+        let checks = [
+            self.require_one_clearance(),
+            self.require_one_choice_of_refinements(),
+            self.duty().map(|_| ()),
+            self.sweep_points(u64::MAX).map(|_| ()),
+        ];
+        checks.into_iter().filter_map(Result::err).find(|fault| fault.code == FieldCode::ConflictingFields)
+    }
+
     /// Returns the parameters of the losses, if friction is given.
     ///
     /// # Errors

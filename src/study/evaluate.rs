@@ -76,7 +76,7 @@ impl<E: Into<NoAnswer>> From<E> for NoValues {
 pub(crate) struct Evaluator {
     pub(crate) quantities: Vec<&'static Quantity>,
     takes_outer_diameter: bool,
-    takes_sweep: bool,
+    pub(crate) takes_sweep: bool,
     takes_losses: bool,
     takes_radial_forces: bool,
     takes_backlash: bool,

@@ -63,7 +63,7 @@ pub(crate) struct Search {
     evaluations: u64,
     seed: u64,
     start: Vec<Vec<f64>>,
-    /// Template for accurate peaks, if the search itself uses sampled peaks.
+    /// Template of the answer's designs, with accurate peaks, if the search itself uses sampled peaks.
     at_true_peaks: Option<Template>,
 }
 
@@ -112,13 +112,12 @@ impl Search {
         let place = |name: &str| ["sweep".to_owned(), name.to_owned()];
         let (samples, tolerance) = (place("samples"), place("tolerance"));
         let is_free = free.keys().any(|pointer| pointer.starts_with("/sweep/"));
-        let is_swept = quantities.iter().any(|quantity| quantity.needs > Needs::Drive);
-        if is_swept && !is_free && base.at(&samples).is_none() && base.at(&tolerance).is_none() {
+        if !is_free && base.at(&samples).is_none() && base.at(&tolerance).is_none() {
             put_in(&mut base, &samples, Tree::Number(SAMPLES));
         }
         let template = Template::new(&base, &list, "free")?;
         let has_duty = base.at(&path("/load/duty").unwrap_or_default()).is_some();
-        let at_true_peaks = (is_swept && !is_free && base.at(&tolerance).is_none()).then(|| {
+        let at_true_peaks = (!is_free && base.at(&tolerance).is_none()).then(|| {
             let mut template = template.clone();
             if !has_duty {
                 template.remove(&samples);

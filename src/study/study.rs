@@ -6,8 +6,8 @@ mod work;
 use std::ops::Range;
 
 use requirements::{
-    asked_quantities, check, is_of_every_draw, require_each_field_once, require_possible_base, require_possible_ranges,
-    require_what_quantities_need,
+    asked_quantities, check, is_of_every_draw, require_each_field_once, require_one_field_of_each_gap,
+    require_possible_base, require_possible_ranges, require_what_quantities_need,
 };
 use serde::{Deserialize, Serialize};
 use toothwave_calculation::field::FieldCode;
@@ -189,6 +189,7 @@ impl Study {
         variants: u64,
         limits: &Limits,
     ) -> Result<Self, NoAnswer> {
+        require_one_field_of_each_gap(&template)?;
         for example in template.examples() {
             require_what_quantities_need(&quantities, example)?;
             require_possible_base(&quantities, &template, example, &limits.calculation)?;

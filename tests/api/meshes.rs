@@ -74,6 +74,9 @@ async fn the_printing_preset_sets_all_clearances() {
         );
         assert_ne!(printed, service.post("/v1/drawings/assembly", &document).await.found());
     }
+    let deprecated = with(&shortest(), "/model", json!({ "clearance": { "ring_um": 10.0 } }));
+    let printed = service.post("/v1/drawings/ring?preset=printing", &deprecated).await.found();
+    assert!(printed["findings"].to_string().contains("deprecated_field"), "{}", printed["findings"]);
     for query in ["?preset=milling", "?preset", "?printing=true"] {
         service.post(&format!("/v1/drawings/ring{query}"), &shortest()).await.refused(400, "invalid_query");
     }

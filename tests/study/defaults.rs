@@ -134,6 +134,19 @@ fn assert_same_id(short: &Value, long: &Value) {
     assert_eq!(study(short).unwrap().id(), study(long).unwrap().id(), "{short} {long}");
 }
 
+/// A search without a sweep has designs for sweeps all the same.
+#[test]
+fn default_samples_are_the_same_for_each_quantity() {
+    let search = json!({
+        "study": "search", "base": paper(), "evaluations": 100,
+        "free": { "/drive/teeth/radius_mm": { "min": 4.0, "max": 5.0 } },
+        "objectives": [{ "quantity": "outer_diameter_mm", "goal": "min" }]
+    });
+    assert_same_id(&search, &with(&search, "/base/sweep", json!({ "samples": 16 })));
+    let found = answer(&search);
+    assert_eq!((&found["evaluated"], &found["front"][0]["design"]["sweep"]["samples"]), (&json!(100), &Value::Null));
+}
+
 #[test]
 fn all_whole_steps_written_out_keep_the_id() {
     let samples = |range: Value| json!({ "study": "map", "base": paper(), "over": { "/sweep/samples": range } });

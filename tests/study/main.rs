@@ -6,6 +6,7 @@
 )]
 
 mod asking;
+mod conflicts;
 mod defaults;
 mod deviations;
 mod engine;

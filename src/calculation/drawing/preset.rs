@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use utoipa::{IntoParams, ToSchema};
 
-use crate::design::Design;
+use crate::design::{ClearanceDocument, Design};
 
 /// Drawing options of a part.
 #[derive(Debug, Default, Deserialize, IntoParams)]
@@ -32,8 +32,12 @@ const PRINTED_CLEARANCE_UM: f64 = 50.0;
 /// Returns the design with clearances for printing instead of its own.
 pub(super) fn printed(design: &Design) -> Design {
     let mut printed = design.clone();
-    // Removed: the field is deprecated, and a gap different from that of the parts would be a conflict.
-    printed.model.clearance = None;
+    // Replaced too, not removed: the finding of the deprecated field is about the document.
+    if let Some(ClearanceDocument { wave_generator_um, ring_um, carrier_um }) = &mut printed.model.clearance {
+        for gap_um in [wave_generator_um, ring_um, carrier_um].into_iter().filter(|gap_um| **gap_um != 0.0) {
+            *gap_um = 2.0 * PRINTED_CLEARANCE_UM;
+        }
+    }
     let parts = &mut printed.parts;
     parts.wave_generator.clearance_um = PRINTED_CLEARANCE_UM;
     parts.teeth.clearance_um = PRINTED_CLEARANCE_UM;

@@ -137,7 +137,7 @@ impl Island {
             return Ok(false);
         }
         match &search.at_true_peaks {
-            Some(template) if !self.is_true => {
+            Some(template) if !self.is_true && evaluator.takes_sweep => {
                 self.is_true = true;
                 self.template = template.clone();
                 self.optimiser.judge_anew(TRUE_EVALUATIONS);

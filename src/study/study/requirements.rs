@@ -120,6 +120,9 @@ pub(super) fn check(
     limits: &question::Limits,
 ) -> Result<(), NoAnswer> {
     let design = document.read::<Design>()?.normalised();
+    if let Some(conflict) = design.conflict() {
+        return Err(conflict.into());
+    }
     if quantities.iter().all(|quantity| quantity.needs == Needs::Drive) {
         CoincidenceDegree.check(&design, limits).map(|_| ())
     } else {
@@ -131,6 +134,28 @@ pub(super) fn check(
 pub(super) fn is_of_every_draw(refused: &NoAnswer) -> bool {
     refused.code == NoAnswerCode::TooManyStates
         || refused.errors.iter().any(|error| error.code == FieldCode::ConflictingFields)
+}
+
+/// Checks that no study varies the gap of a contact by one field while another field sets it. At 0 the varied field would
+/// count as left out.
+pub(super) fn require_one_field_of_each_gap(template: &Template) -> Result<(), NoAnswer> {
+    let is_set = |pointer: &String| {
+        let path = path(pointer).unwrap_or_default();
+        let is_gap = |example: &Tree| matches!(example.at(&path), Some(Tree::Number(gap_um)) if *gap_um != 0.0);
+        template.is_varied(pointer) || template.examples().any(is_gap)
+    };
+    for contact in ["wave_generator", "ring", "carrier"] {
+        let deprecated = vec![format!("/model/clearance/{contact}_um")];
+        let of_parts = vec![format!("/parts/{contact}/clearance_um"), "/parts/teeth/clearance_um".into()];
+        for (fields, others) in [(&of_parts, &deprecated), (&deprecated, &of_parts)] {
+            let varied = fields.iter().find(|pointer| template.is_varied(pointer));
+            if let (Some(varied), Some(other)) = (varied, others.iter().find(|pointer| is_set(pointer))) {
+                let detail = format!("`{other}` sets the same gap. Remove one");
+                return Err(fault(&template.blamed(varied), FieldCode::ConflictingFields, detail));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Checks that every range of a free number overlaps the allowed range of its field.
