@@ -424,7 +424,8 @@ pub(crate) fn drive_findings(drive: &Drive) -> Result<Vec<FindingAnswer>, NoAnsw
 pub(crate) fn write_findings(findings: &[FindingAnswer], writer: &mut dyn Write) -> io::Result<()> {
     for finding in findings {
         let FindingAnswer { severity, detail, value, limit, unit, advice, .. } = finding;
-        writeln!(writer, "\n{severity:?}: {detail} ({value:.6} against {limit:.6} {unit}); {advice}")?;
+        let limit = format!("{limit:.6} {unit}");
+        writeln!(writer, "\n{severity:?}: {detail} ({value:.6} against {}); {advice}", limit.trim_end())?;
     }
     Ok(())
 }
