@@ -24,6 +24,7 @@ pub mod key;
 pub mod materials;
 pub mod no_answer;
 pub mod question;
+pub mod schema_ranges;
 pub mod strengths;
 pub mod sweep;
 mod union;

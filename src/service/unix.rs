@@ -6,29 +6,17 @@ use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::Path;
 
 use rustix::process::{Resource, getrlimit, setrlimit};
-use tokio::net::TcpStream;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-/// SIGTERM and SIGINT, which stop the service.
-#[derive(Debug)]
-pub struct StopSignals {
-    terminate: Signal,
-    interrupt: Signal,
-}
-
-impl StopSignals {
-    /// Handles the signals from now on.
-    pub fn new() -> io::Result<Self> {
-        Ok(Self { terminate: signal(SignalKind::terminate())?, interrupt: signal(SignalKind::interrupt())? })
-    }
-
-    /// Waits for the next of them.
-    pub async fn recv(&mut self) {
+/// Handles SIGTERM and SIGINT from now on. The returned function waits for the next of them.
+pub fn stop_signals() -> io::Result<impl AsyncFnMut()> {
+    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    Ok(async move || {
         tokio::select! {
-            _ = self.terminate.recv() => {}
-            _ = self.interrupt.recv() => {}
+            _ = terminate.recv() => {}
+            _ = interrupt.recv() => {}
         }
-    }
+    })
 }
 
 /// Returns the stream of SIGHUP.
@@ -51,19 +39,6 @@ pub fn raise_file_limit() {
 /// Lowers the priority of this thread (Linux) or process. On failure it stays.
 pub fn lower_priority(nice: i32) {
     let _ = rustix::process::nice(nice);
-}
-
-/// Switches transparent huge pages off. With them, clearing 2 MiB for each answer of 80 KB takes a sixth of its time.
-pub fn use_small_pages() {
-    #[cfg(target_os = "linux")]
-    let _ = rustix::thread::disable_transparent_huge_pages(true);
-}
-
-/// Disconnects a client that takes no data for so long.
-#[cfg_attr(not(target_os = "linux"), expect(unused_variables, reason = "only Linux has this option"))]
-pub fn limit_unsent_time(stream: &TcpStream, limit: std::time::Duration) {
-    #[cfg(target_os = "linux")]
-    let _ = socket2::SockRef::from(stream).set_tcp_user_timeout(Some(limit));
 }
 
 /// Creates a file that other users cannot read, unless it exists.

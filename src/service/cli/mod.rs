@@ -29,7 +29,7 @@ use crate::http::problem::Problem;
 use crate::http::{router, server};
 use crate::ops::config::Settings;
 use crate::ops::{keys, log};
-use crate::unix::{outlive_file_size_limit, use_small_pages};
+use crate::unix::outlive_file_size_limit;
 use offline::{FORMATS, PARTS, answer, one_of, print, read};
 
 /// Exit status for bad input: 2, as in most tools.
@@ -220,7 +220,9 @@ fn arguments() -> Vec<OsString> {
 
 fn run_service(settings: &Settings) -> Result<(), Failure> {
     let _written_at_end = log::start(settings.log.clone());
-    use_small_pages();
+    // With transparent huge pages, clearing 2 MiB for each answer of 80 KB takes a sixth of its time.
+    #[cfg(target_os = "linux")]
+    let _ = rustix::thread::disable_transparent_huge_pages(true);
     let runtime = Builder::new_multi_thread().enable_all().build()?;
     let result = runtime.block_on(async {
         outlive_file_size_limit()?;

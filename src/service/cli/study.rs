@@ -1,5 +1,4 @@
-//! Command `toothwave study`: computes many variants of one design on all cores of this machine, or as jobs of a
-//! cluster.
+//! Command `toothwave study`: computes a study on all cores of this machine, or as jobs of a cluster.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};

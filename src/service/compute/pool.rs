@@ -150,8 +150,7 @@ impl Pool {
         self.run_on(&self.0.interactive, permit, job).await
     }
 
-    /// Computes for a request on the executor's thread. For work of at most about 0.1 ms: a change of threads would add
-    /// a quarter.
+    /// Computes for a request on the executor, for work of at most 0.1 ms: a change of threads would add a quarter.
     pub async fn run_inline<T>(&self, job: impl FnOnce(&AtomicBool) -> Result<T, Problem>) -> Result<T, Problem> {
         let _permit = self.interactive_permit().await?;
         timed(|| catch_panic(|| job(&AtomicBool::new(false))))

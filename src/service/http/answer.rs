@@ -206,8 +206,7 @@ pub fn broken_body(error: &dyn std::fmt::Display) -> Problem {
     Problem::new(ProblemCode::BrokenBody, format!("the body is incomplete or damaged: {error}. Send it again"))
 }
 
-/// Parses the design and computes a value from it. A long document is parsed on a thread of the pool, not on the
-/// executor.
+/// Parses the design and computes a value from it. The pool parses long documents, not the executor.
 async fn read_design<T: Send + 'static>(
     app: &App,
     body: Bytes,
@@ -293,8 +292,7 @@ pub fn write<A: Forms>(
     written.map(without_spare).map_err(|error| write_problem(&error, stop))
 }
 
-/// Returns the bytes without spare capacity. A body that may be cached is copied, because the buffer's pages are reused
-/// at once.
+/// Returns the bytes without spare capacity. Bytes for the cache are copied: the buffer is reused at once.
 fn without_spare(bytes: Vec<u8>) -> Bytes {
     if bytes.len() <= MAX_BODY_BYTES { Bytes::copy_from_slice(&bytes) } else { bytes.into_boxed_slice().into() }
 }

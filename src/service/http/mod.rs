@@ -8,6 +8,5 @@ pub mod negotiation;
 pub(crate) mod observe;
 mod openapi;
 pub mod problem;
-mod ranges;
 pub mod router;
 pub mod server;

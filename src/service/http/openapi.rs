@@ -1,11 +1,11 @@
 //! The API document for client generators, and a version in OpenAPI 3.0.3 for generators without 3.1.
 
 use serde_json::{Map, Value, json};
+use toothwave_calculation::schema_ranges::put_ranges;
 
 use super::problem::PROBLEM_JSON;
-use super::ranges::put_ranges;
 
-pub(super) const SCHEMAS: &str = "/components/schemas";
+const SCHEMAS: &str = "/components/schemas";
 
 /// Adds what utoipa cannot express: the server, one `Problem` for all, named variants with a discriminator, and ranges.
 pub(crate) fn for_generators(document: &mut Value) {
@@ -20,7 +20,7 @@ pub(crate) fn for_generators(document: &mut Value) {
     default_words_beside_their_words(document);
     join_variants(document);
     name_variants(document);
-    put_ranges(document);
+    put_ranges(document, &format!("{SCHEMAS}/Design"));
 }
 
 /// Joins a variant's schema and the schema of its tag to one object. With `additionalProperties: false`, `allOf` of the
@@ -62,8 +62,7 @@ fn parameter_that_is_never_null(object: &mut Map<String, Value>) {
     }
 }
 
-/// Removes the default `null`, which utoipa writes, from fields that may be absent but not null. Generators reject or
-/// send it.
+/// Removes utoipa's default `null` from fields that may be absent but not null. Generators reject or send it.
 fn no_null_by_default(schema: &mut Map<String, Value>) {
     let may_be_null = schema.get("type").and_then(Value::as_array).is_some_and(|types| types.contains(&json!("null")));
     if schema.get("default") == Some(&Value::Null) && !may_be_null {

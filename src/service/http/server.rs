@@ -19,6 +19,7 @@ use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
+use socket2::SockRef;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -31,7 +32,7 @@ use crate::app::App;
 use crate::ops::config::{CLIENT_TIMEOUT_MS, MAX_CONNECTIONS, MAX_HEADER_BYTES, Settings, StudiesPlace};
 use crate::ops::metrics;
 use crate::studies::{Storage, Store};
-use crate::unix::{StopSignals, hang_ups, limit_unsent_time, raise_file_limit};
+use crate::unix::{hang_ups, raise_file_limit, stop_signals};
 
 /// Shortest time for which the service still listens after it reports that it is not ready.
 const NOTICE: Duration = Duration::from_millis(200);
@@ -52,7 +53,7 @@ const REFUSAL: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\ncontent-type: appli
 pub async fn serve(settings: &Settings) -> io::Result<()> {
     metrics::install();
     // First: without a handler, process 1 of a container ignores signals.
-    let mut stop_signals = StopSignals::new()?;
+    let mut stop_signal = stop_signals()?;
     raise_file_limit();
     let listener = TcpListener::bind(settings.listen)
         .await
@@ -69,12 +70,12 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
     });
     watch_keys(settings)?;
     let stopping = async {
-        stop_signals.recv().await;
+        stop_signal().await;
         tracing::info!("stopping: not ready, still listening");
         app.ready.store(false, Ordering::Relaxed);
         tokio::select! {
             () = sleep(NOTICE.max(Duration::from_millis(settings.lame_duck_ms))) => false,
-            () = stop_signals.recv() => true,
+            () = stop_signal() => true,
         }
     };
     let has_second_signal = tokio::select! {
@@ -86,7 +87,7 @@ pub async fn serve(settings: &Settings) -> io::Result<()> {
         drop(listener);
         tokio::select! {
             () = server.finish(&app, Duration::from_millis(settings.shutdown_ms)) => {}
-            () = stop_signals.recv() => tracing::warn!("second signal: running requests are aborted"),
+            () = stop_signal() => tracing::warn!("second signal: running requests are aborted"),
         }
     }
     tracing::info!("stopped");
@@ -177,7 +178,8 @@ impl Server {
     fn handle(&self, stream: TcpStream) {
         // Without `TCP_NODELAY` small responses may wait for the acknowledgement of earlier ones.
         let _ = stream.set_nodelay(true);
-        limit_unsent_time(&stream, Duration::from_millis(CLIENT_TIMEOUT_MS));
+        #[cfg(target_os = "linux")]
+        let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(Duration::from_millis(CLIENT_TIMEOUT_MS)));
         match Arc::clone(&self.connection_permits).try_acquire_owned() {
             Ok(permit) => self.serve_connection(stream, permit),
             Err(_) => {
@@ -231,8 +233,7 @@ impl Server {
     }
 }
 
-/// Sends the refusal to a connection over the limit. The request is read first: closing a connection with unread bytes
-/// resets it.
+/// Refuses a connection over the limit. Closing it with unread bytes would reset it, so the request is read first.
 async fn refuse(mut stream: TcpStream) -> io::Result<()> {
     let mut head = [0; 4096];
     let _ = stream.read(&mut head).await?;

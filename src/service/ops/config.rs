@@ -1,5 +1,4 @@
-//! The settings of the service: each is a flag and a `TOOTHWAVE_…` variable. All other limits are constants, or parts of
-//! the memory limit.
+//! The settings of the service: each is a flag and a `TOOTHWAVE_…` variable. All other limits are constants.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;

@@ -68,8 +68,7 @@ pub fn refusals(code: ProblemCode) -> Counter {
     counter!("toothwave_refusals_total", "reason" => word(&code))
 }
 
-/// Counts a request. Routes, methods and statuses are few, so there are few series. There is no status if the client
-/// left early.
+/// Counts a request. Routes, methods and statuses are few. There is no status if the client left early.
 pub fn count_request(
     route: &str,
     method: &'static str,

@@ -70,8 +70,7 @@ impl Studies {
         }
     }
 
-    /// Loads the stored studies and continues the running ones. Removes expired studies and those with a damaged
-    /// document.
+    /// Loads the stored studies and continues running ones. Removes expired and damaged ones.
     pub async fn load(&self) -> Result<(), StoreError> {
         let Some(Storage { store, .. }) = &self.storage else { return Ok(()) };
         for stored in store.with(store::load).await? {

@@ -205,8 +205,7 @@ impl Store {
         let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         require_schema(&transaction)?;
         transaction.commit()?;
-        // A commit survives the process. After a power cut the last ones may be missing; their chunks are computed
-        // again.
+        // A commit survives the process. After a power cut the last ones may be missing, and are computed again.
         connection.pragma_update_and_check(None, "journal_mode", "WAL", |_| Ok(()))?;
         connection.pragma_update(None, "synchronous", "NORMAL")?;
         Ok(Self { connection: Arc::new(Mutex::new(connection)), is_in_memory: file.is_none() })
@@ -226,8 +225,7 @@ impl Store {
         tokio::task::spawn_blocking(move || store.now(work)).await.unwrap_or(Err(StoreError::Silent))
     }
 
-    /// Writes the write-ahead log into the file. The process may exit before the connection is dropped, which would do
-    /// it too.
+    /// Writes the write-ahead log into the file: the process may exit before the connection is dropped.
     pub(super) fn merge_log(&self) {
         if let Err(error) = self.connection.lock().query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())) {
             tracing::warn!(%error, "cannot merge the write-ahead log into the study database");

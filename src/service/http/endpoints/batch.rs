@@ -1,5 +1,4 @@
-//! `POST /v1/batch`: many design documents for one endpoint, one a line. Answers are streamed in the order of the
-//! lines.
+//! `POST /v1/batch`: many design documents for one endpoint, one a line. Answers keep the order of the lines.
 //!
 //! Lines are answered in slices of 5 ms; each slice is one background computation. As many computations run at once as
 //! there are permits. If the client does not read, no further line is computed.

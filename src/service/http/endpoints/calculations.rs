@@ -1,5 +1,4 @@
-//! `POST /v1/geometry`, `/v1/coincidence-degree`, `/v1/sweep` and `/v1/accuracy`: one calculation for one design
-//! document.
+//! `POST /v1/geometry`, `/v1/coincidence-degree`, `/v1/sweep`, `/v1/accuracy`: one calculation for one document.
 
 use std::sync::Arc;
 

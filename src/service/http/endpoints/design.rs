@@ -1,5 +1,4 @@
-//! `POST /v1/design`: geometry, contact ratio and sweep of a design in one answer, for programs that show a design
-//! while it changes.
+//! `POST /v1/design`: geometry, contact ratio and sweep in one answer, for programs that show a changing design.
 
 use std::sync::Arc;
 
@@ -128,8 +127,7 @@ impl Question for WholeDesign {
     }
 }
 
-/// Returns one answer, or none and sets its problem. An error that is no property of the design fails the whole
-/// request.
+/// Returns one answer, or none and sets its problem. An error besides the design fails the whole request.
 fn part<Q: Question>(
     checked: &Checked<Q>,
     stop: &dyn Stop,

@@ -1,15 +1,15 @@
 //! Ranges in the API document, from the solver's table of parameters.
 
 use serde_json::{Value, json};
-use toothwave_calculation::field::ranges;
 
-use super::openapi::SCHEMAS;
+use crate::field::ranges;
 
 /// Writes the range of each parameter to the numbers at its place in the design document, and to a list that of its
-/// length. A bound that a schema has already stays: two kinds of wave generator have different ranges at one place.
-pub(super) fn put_ranges(document: &mut Value) {
+/// length. `design` is the pointer to the schema of the design document. A bound that a schema has already stays: two
+/// kinds of wave generator have different ranges at one place.
+pub fn put_ranges(document: &mut Value, design: &str) {
     for (pointer, range) in ranges() {
-        let mut places = vec![format!("{SCHEMAS}/Design")];
+        let mut places = vec![design.to_owned()];
         for name in pointer.split('/').skip(1) {
             places = places.iter().flat_map(|place| fields(document, place, name)).collect();
         }
