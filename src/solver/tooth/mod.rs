@@ -267,13 +267,19 @@ impl Contacts {
                     },
                 })
             }
-            (&Term::Power { coefficient, .. }, Term::Power { .. }, Term::Power { .. }) if is_alone => {
+            (&Term::Power { coefficient, .. }, ring, carrier)
+                if is_alone && wave_generator == ring && ring == carrier =>
+            {
                 Some(ToothLaw::Palmgren { coefficient })
             }
-            (&Term::Power { coefficient, .. }, Term::Power { .. }, carrier @ (Term::Power { .. } | Term::Flat)) => {
-                let at_carrier = if *carrier == Term::Flat { 0.0 } else { coefficient };
+            (
+                &Term::Power { coefficient: wave_generator, .. },
+                &Term::Power { coefficient: ring, .. },
+                carrier @ (Term::Power { .. } | Term::Flat),
+            ) => {
+                let carrier = if let Term::Power { coefficient, .. } = *carrier { coefficient } else { 0.0 };
                 Some(ToothLaw::PalmgrenAndLinear {
-                    coefficient: PerContact { wave_generator: coefficient, ring: coefficient, carrier: at_carrier },
+                    coefficient: PerContact { wave_generator, ring, carrier },
                     compliance_mm_per_n: *series,
                 })
             }
