@@ -79,6 +79,11 @@ impl Template {
                 let detail = format!("`{pointer}` is an object or a list. Name one of its fields");
                 return Err(fault(&at(pointer), FieldCode::WrongType, detail));
             }
+            // A strength by its name, or estimated compliances.
+            if (2..path.len()).any(|depth| matches!(base.at(&path[..depth]), Some(Tree::Text(_)))) {
+                let detail = format!("the base gives a word for the object of `{pointer}`. Give its fields instead");
+                return Err(fault(&at(pointer), FieldCode::ConflictingFields, detail));
+            }
             let (domain, choices) = match asked {
                 Asked::Range { min, max } => (Domain::Real { min: *min, max: *max }, Vec::new()),
                 Asked::OneOf(choices) => (Domain::OneOf(choices.len()), choices.clone()),

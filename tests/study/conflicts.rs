@@ -56,3 +56,18 @@ fn gap_of_zero_beside_deprecated_gap_is_refused() {
     let [map, _] = studies(&deprecated, "/parts/carrier/clearance_um");
     crate::asking::study(&map).unwrap();
 }
+
+/// Otherwise the other fields of the object would lose the values that the word stands for.
+#[test]
+fn field_of_object_given_as_word_is_refused() {
+    for (place, value, varied) in [
+        ("/parts", json!({ "carrier": { "strength": "100cr6" } }), "/parts/carrier/strength/yield_strength_mpa"),
+        ("/model", json!({ "series_compliance_mm_per_n": "estimated" }), "/model/series_compliance_mm_per_n/ring"),
+    ] {
+        let [map, search] = studies(&with(&paper(), place, value), varied);
+        for (study, list) in [(map, "over"), (search, "free")] {
+            let at = format!("/{list}/{}", varied.replace('/', "~1"));
+            assert_eq!(faulty(&study), (at, "conflicting_fields".into()), "{study}");
+        }
+    }
+}
