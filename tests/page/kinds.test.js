@@ -246,7 +246,7 @@ test('peaks state their model error', async () => {
     'The model’s own error: force −1 to 0\u202f%, stress −2 to +1\u202f%.',
     '',
     'The model’s own error: wind-up −2 to −1\u202f%, with bodies that are rigid below the depth of the contact law. ' +
-      'Besides, for a housed rim and fingers held at both ends: by the estimates −13 %, −25 to −20\u202f% in earlier calculations of elastic bodies.',
+      'Besides, for a housed rim and stiff fingers: by the estimates −12 %, −25 to −20\u202f% in earlier calculations of elastic bodies.',
     estimated,
   ]);
   await setDocument(page, { ...unnamed, parts: { carrier, ring: { clearance_um: 20 } } });
