@@ -46,6 +46,21 @@ test('clearances have their group and their sums', async () => {
   assert.equal(new Set(helps).size, 4);
 });
 
+test('estimated compliance stands in its fields and is kept', async () => {
+  const page = await bed.open(FIRST);
+  await setDocument(page, { drive: (await designOf(page)).drive, load: { input_torque_nm: 20 }, model: { series_compliance_mm_per_n: 'estimated' } });
+  const { sweep } = await bed.server.answers(await designOf(page));
+  const [ring, carrier] = ['ring', 'carrier'].map((contact) => Number(sweep.series_compliance_estimates.find((each) => each.contact === contact && each.is_as_held).compliance_mm_per_n.toPrecision(3)));
+  await page.click('summary:has-text("Compliance of the supports")');
+  const series = '/model/series_compliance_mm_per_n';
+  assert.deepEqual(await Promise.all(['wave_generator', 'ring', 'carrier'].map((contact) => page.getAttribute(field(`${series}/${contact}`), 'placeholder'))), ['0', String(ring), String(carrier)]);
+  await page.click('#more');
+  assert.equal(await page.locator('button[aria-label$="take over as series compliance"] >> visible=true').count(), 0);
+  assert.match(await page.textContent('#table'), /Forces include it/);
+  await enter(page, `${series}/wave_generator`, '1e-6');
+  assert.deepEqual((await designOf(page)).model.series_compliance_mm_per_n, { wave_generator: 1e-6, ring, carrier });
+});
+
 test('tiles keep their notes beside a reference', async () => {
   const page = await bed.open(FIRST);
   await page.click('#keep');

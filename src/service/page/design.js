@@ -110,6 +110,25 @@ export function withVirtualWork(design) {
   return changed(changed(design, '/model/stiffness/law', lawOf(design)), '/model/compatibility', 'virtual_work');
 }
 
+const SERIES = '/model/series_compliance_mm_per_n';
+
+/** Whether the service adds its estimates of the supports' compliance. */
+export const isEstimated = (design) => at(design, SERIES) === 'estimated';
+
+/** The estimates for the parts as they are held, by contact. */
+export const estimatesOf = ({ sweep }) =>
+  Object.fromEntries((sweep?.series_compliance_estimates ?? []).filter(({ is_as_held: isAsHeld }) => isAsHeld).map(({ contact, compliance_mm_per_n: compliance }) => [contact, Number(compliance.toPrecision(3))]));
+
+/** The document with the estimates taken over: as a word, or for one contact as a number where the others have numbers. */
+export function withEstimate(design, contact, answers) {
+  const isNumbers = isGiven(at(design, SERIES)) && !isEstimated(design);
+  return withVirtualWork(isNumbers ? changed(design, `${SERIES}/${contact}`, estimatesOf(answers)[contact]) : changed(design, SERIES, 'estimated'));
+}
+
+/** One number takes the place of the word: the other contacts then have their estimates as numbers. */
+export const withOtherEstimates = (design, before, answers) =>
+  withVirtualWork(isEstimated(before) ? changed(design, SERIES, { ...estimatesOf(answers), ...at(design, SERIES) }) : design);
+
 export const isGiven = (value) => (typeof value === 'object' && value !== null ? Object.values(value).some(isGiven) : Boolean(value));
 
 /** What makes the parts of a design other than the nominal ones: `{ drawn, undrawn }`, as a drawing has it or none. */

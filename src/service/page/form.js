@@ -130,9 +130,9 @@ export class Form {
     return this.#buildNumber(field);
   }
 
-  /** `adjust` changes what follows from it. */
+  /** `adjust` changes what follows from it, perhaps from the design and the answers before. */
   #edit(pointer, value, adjust = (design) => design) {
-    this.#replace(adjust(changed(this.#design, pointer, value)), pointer);
+    this.#replace(adjust(changed(this.#design, pointer, value), this.#design, this.#answers), pointer);
   }
 
   /** The document's value may be none, or no text. */

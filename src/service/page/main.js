@@ -6,7 +6,7 @@ import { Accuracy } from './accuracy.js';
 import { copy } from './clipboard.js';
 import { Comparison } from './comparison.js';
 import { converted } from './convert.js';
-import { changed, isSame, withVirtualWork } from './design.js';
+import { isSame, withEstimate } from './design.js';
 import { listenToDocument } from './document-dialog.js';
 import { byId, oncePerFrame, setProperties, setText } from './dom.js';
 import { Drawings } from './drawings.js';
@@ -111,7 +111,7 @@ const results = new Results(
   { table: byId('table'), more: byId('more') },
   (peak) => turning.stopAtPeak(peak),
   goTo,
-  ({ pointer, value }) => setDesign(withVirtualWork(changed(state.design, pointer, value))),
+  (contact, answers) => setDesign(withEstimate(state.design, contact, answers)),
 );
 
 const findingsList = new FindingsList(byId('findings'), { labelOf, goTo, remedyButton: (finding) => form.remedyButton(finding) });

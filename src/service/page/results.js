@@ -1,6 +1,6 @@
 // What a designer decides by, as a table: each row is one entry here. A result that the service does not answer is not shown.
 
-import { at } from './design.js';
+import { at, isEstimated } from './design.js';
 import { html, setAttributes, setProperties, setText, symbol } from './dom.js';
 import { DASH, difference, number, withUnit } from './format.js';
 import { unpublished } from './materials.js';
@@ -97,16 +97,14 @@ const lossRows = [
 
 const BACKINGS = ['cam_on_bore', 'housed_rim', 'free_rim', 'finger_at_both_ends', 'finger_at_one_end', 'finger_joined_at_far_end', 'finger_on_web'];
 
-/** What parts behind the contacts are estimated to give way, to be taken over as series compliance. */
+/** What parts behind the contacts are estimated to give way; those of the parts as they are held can be taken over. */
 const backingRows = BACKINGS.map((key) => {
   const of = ({ sweep }) => sweep?.series_compliance_estimates?.find(({ backing }) => backing === key);
-  return row(t(`result.backing.${key}`), '', 'mm/N', (answers) => of(answers)?.compliance_mm_per_n, {
+  const label = t(`result.backing.${key}`);
+  return row(label, '', 'mm/N', (answers) => of(answers)?.compliance_mm_per_n, {
     significant: 3,
-    taken: (answers) => {
-      const { contact, compliance_mm_per_n: compliance, share } = of(answers);
-      const text = share === undefined ? t('result.take_over') : t('result.take_over_adds', { percent: number(100 * share, 2) });
-      return { pointer: `/model/series_compliance_mm_per_n/${contact}`, value: Number(compliance.toPrecision(3)), text };
-    },
+    name: (answers) => (of(answers).share === undefined ? label : t('result.backing_adds', { label, percent: number(100 * of(answers).share, 2) })),
+    taken: (answers) => (of(answers)?.is_as_held && !isEstimated(answers.design) ? of(answers).contact : undefined),
   });
 });
 
@@ -233,7 +231,7 @@ export const GROUPS = [
     isMore: true,
     // To work with, not to report: what was taken over stands in the design.
     isOnScreenAlone: true,
-    told: ({ sweep }) => (sweep?.series_compliance_estimates?.length > 0 ? t('result.estimated') : ''),
+    told: ({ design, sweep }) => (sweep?.series_compliance_estimates?.length > 0 ? t(isEstimated(design) ? 'result.estimated_included' : 'result.estimated') : ''),
     rows: backingRows,
   },
   {
@@ -277,7 +275,7 @@ export class Results {
   #told = [];
 
   /** `onShow({ input_angle_deg, position_deg })` when a peak's place is picked, `onAsk(pointer)` when a result is wanted that the
-   *  design has to ask for, `onTake({ pointer, value })` when an estimate is taken over into the design. */
+   *  design has to ask for, `onTake(contact, answers)` when an estimate is taken over into the design. */
   constructor({ table, more }, onShow, onAsk, onTake) {
     this.table = table;
     more.addEventListener('click', () => {
@@ -305,10 +303,10 @@ export class Results {
         const place = entry.place && html('button', { type: 'button', class: 'link number', title: t('result.show') });
         const scope = entry.scoped && html('span');
         const name = html('span', {}, entry.label);
-        const taken = entry.taken && html('button', { type: 'button', class: 'link number', 'aria-label': t('result.take_over_as', { what: entry.label }) });
+        const taken = entry.taken && html('button', { type: 'button', class: 'link number', 'aria-label': t('result.take_over_as', { what: entry.label }) }, t('result.take_over'));
         const cell = { entry, name, taken, scope, value, unit, reference, referenceUnit, delta, place };
         place?.addEventListener('click', () => onShow(cell.at));
-        taken?.addEventListener('click', () => onTake(entry.taken(cell.answers)));
+        taken?.addEventListener('click', () => onTake(entry.taken(cell.answers), cell.answers));
         const kind = entry.text ? 'numeric words' : 'numeric';
         const line = html(
           'tr',
@@ -352,8 +350,7 @@ export class Results {
       cell.at = place && shown && entry.place(answers);
       if (cell.taken) {
         cell.answers = answers;
-        setProperties(cell.taken, { hidden: !shown });
-        if (shown) setText(cell.taken, entry.taken(answers).text);
+        setProperties(cell.taken, { hidden: !entry.taken(answers) });
       }
       if (place) setProperties(place, { hidden: !cell.at });
       if (cell.at) {

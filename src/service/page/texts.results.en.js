@@ -113,6 +113,7 @@ export const RESULTS = {
     shear_stress: 'Largest shear stress',
     shear_depth: 'Its depth',
     estimated: 'Estimated from the parts as they are made. Forces leave it out until you take it over.',
+    estimated_included: 'Estimated from the parts as they are made. Forces include it for the supports of this design.',
     backing: {
       cam_on_bore: 'Cam on its bore',
       housed_rim: 'Rim in a housing',
@@ -123,7 +124,7 @@ export const RESULTS = {
       finger_on_web: 'Finger on a web in its middle',
     },
     take_over: 'take over',
-    take_over_adds: 'take over, adds {percent} %',
+    backing_adds: '{label}, adds {percent} %',
     take_over_as: '{what}: take over as series compliance',
     torque_balance: 'Torque balance, residual',
     period_closure: 'Period closure, residual',

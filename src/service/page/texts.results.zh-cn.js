@@ -113,6 +113,7 @@ export const RESULTS = {
     shear_stress: '最大切应力',
     shear_depth: '最大切应力深度',
     estimated: '按零件结构尺寸估算；采用之前不计入受力。',
+    estimated_included: '按零件结构尺寸估算；受力已计入本设计支承方式的估算值。',
     backing: {
       cam_on_bore: '带孔凸轮',
       housed_rim: '壳体内的轮缘',
@@ -123,7 +124,7 @@ export const RESULTS = {
       finger_on_web: '中间腹板上的指',
     },
     take_over: '采用',
-    take_over_adds: '采用，增加 {percent} %',
+    backing_adds: '{label}，增加 {percent} %',
     take_over_as: '{what}：采用为串联柔度',
     torque_balance: '转矩平衡残差',
     period_closure: '周期闭合残差',
