@@ -392,18 +392,11 @@ function print(isPrinting) {
   if (isPrinting) {
     byId('findings-table').replaceChildren(...findingsTable(state.findings));
     byId('report').replaceChildren(...reportOf(...reported(), location.href));
-    if (motion) showMostLoaded();
   }
+  turning.print(isPrinting);
+  if (isPrinting && motion) turning.show(mechanism.render(turning));
   document.documentElement.classList.toggle('printing', isPrinting);
   plots.print(isPrinting);
-}
-
-/** A reader of paper cannot choose another tooth. */
-function showMostLoaded() {
-  const largest = ({ stress }) => Math.max(...Object.values(stress));
-  const [most] = motion.loaded(turning.inputDeg).sort((one, other) => largest(other) - largest(one));
-  if (most) turning.select(most.tooth);
-  turning.show(mechanism.render(turning));
 }
 
 // ---- the start
