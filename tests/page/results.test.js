@@ -87,6 +87,8 @@ test('material is recognised by its numbers', async () => {
   const { materials, ...others } = await designOf(page);
   await setDocument(page, { ...others, materials: { carrier: materials.ring } });
   assert.equal(await material(page, 'Carrier').inputValue(), '');
+  await setDocument(page, { ...others, materials });
+  assert.equal(await material(page, 'Ring').inputValue(), '', 'the choice was that of another document');
   assert.doesNotMatch(await page.textContent('#findings'), note);
 });
 

@@ -332,7 +332,7 @@ export class Form {
     this.#take(entry);
   }
 
-  /** Shows a document; sliders span anew around its values where `respan` says that it is another one. */
+  /** Shows a document; where `respan` says that it is another one, sliders span anew around its values and chosen materials are forgotten. */
   setDesign(design, { respan = false } = {}) {
     if (!isSame(design, this.#design)) this.notes.told = undefined;
     this.#design = design;
@@ -341,7 +341,10 @@ export class Form {
       setText(summary, group.summary?.(design, group) ?? '');
       if (told) setText(told, group.told(design));
     }
-    for (const filling of this.#fillings) this.#showFilling(filling);
+    for (const filling of this.#fillings) {
+      if (respan) filling.chosen = '';
+      this.#showFilling(filling);
+    }
   }
 
   /** Shows the option that is chosen; what no design like this one can have is not offered. */
