@@ -70,6 +70,18 @@ test('tiles keep their notes beside a reference', async () => {
   assert.match(await tile(page, 'Torsional stiffness').textContent(), /kN·m\/rad.*least; up to/);
 });
 
+test('design is shown before the materials arrive', async () => {
+  const page = await bed.open(FIRST);
+  let release;
+  const released = new Promise((resolve) => (release = resolve));
+  await page.route('**/v1/materials', (route) => released.then(() => route.continue()));
+  await page.reload();
+  await settled(page);
+  assert.equal(await material(page, 'Ring').isHidden(), true);
+  release();
+  await material(page, 'Ring').locator('option[value=bronze]').waitFor({ state: 'attached' });
+});
+
 test('material is recognised by its numbers', async () => {
   const page = await bed.open(FIRST);
   await page.click('summary:has-text("Materials")');

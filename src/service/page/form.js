@@ -111,6 +111,7 @@ export class Form {
       select.replaceChildren(html('option', { value: '', disabled: true }, t('form.fill_in')), ...knownMaterials().map(({ name, title }) => html('option', { value: name }, title)));
       element.hidden = knownMaterials().length === 0;
     }
+    for (const filling of this.#fillings) this.#showFilling(filling);
   }
 
   /** The material that has a part's numbers; of several that share them the one that was chosen. */

@@ -63,6 +63,7 @@ const state = {
   view: 'design',
 };
 let motion;
+let lastResult;
 let gesture;
 
 const history = new History();
@@ -270,6 +271,7 @@ function fromAddress({ atStart = false } = {}) {
 // ---- what the service says
 
 function onResult({ design, answers, problems, solveMs }) {
+  lastResult = { design, answers, problems, solveMs };
   state.problems = problems;
   state.reasons = reasonsOf(problems);
   const isDrawn = answers.geometry !== undefined;
@@ -473,14 +475,19 @@ async function load() {
   examples.offer();
 }
 
+function offerMaterials({ materials }) {
+  learnMaterials(materials);
+  form.offerMaterials();
+  if (lastResult) onResult(lastResult);
+}
+
 async function start() {
   byId('glossary').append(glossary());
   byId('position-term').append(term('position'));
   listen();
   await load();
   // Names save typing; without them the numbers can still be entered.
-  learnMaterials((await getJson('v1/materials').catch(() => ({ materials: [] }))).materials);
-  form.offerMaterials();
+  getJson('v1/materials').then(offerMaterials, () => {});
   find.restore();
   if (!fromAddress({ atStart: true })) {
     const { first } = examples;
