@@ -10,7 +10,7 @@ const FIRST = { example: null };
 const tile = (page, name) => page.locator('#key-figures .tile:visible', { hasText: name });
 const material = (page, part) => page.locator(`select[aria-label="${part}: fill in a material"]`);
 
-test('heading names the load of the results', async () => {
+test('line above the tiles names the load', async () => {
   const page = await bed.open(FIRST);
   assert.match(await page.textContent('#load-line'), /^At 20.N·m input torque \(280.N·m at the output\)$/);
   const { load, ...others } = await designOf(page);

@@ -103,8 +103,8 @@ export const effectOn = (before, after) =>
 export class Tiles {
   #tiles = [];
 
-  constructor(heading, container) {
-    Object.assign(this, { heading, container });
+  constructor(loadLine, container) {
+    Object.assign(this, { loadLine, container });
     for (const entry of TILES) {
       const value = html('data', { class: 'value number' });
       const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
@@ -125,7 +125,7 @@ export class Tiles {
   /** Shows answers, and their differences from those of a reference. What has no answer keeps its place but no number; `isHeld` says that no
    *  tile may go, because a slider is held. */
   update(answers, reference, isHeld) {
-    setText(this.heading, loadInWords(answers));
+    setText(this.loadLine, loadInWords(answers));
     for (const { entry, tile, name, value, delta, note, scope } of this.#tiles) {
       if (scope) setText(scope, scopeOf(entry, answers));
       if (entry.name) setText(name, entry.name(answers));
