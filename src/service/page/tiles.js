@@ -63,7 +63,7 @@ const TILES = [
   },
   {
     ...row(t('result.stiffness'), '', 'kN·m/rad', (answers) => stiffnessOf(least, answers), { significant: 4 }),
-    note: (answers) => t('result.stiffness_up_to', { most: number(stiffnessOf(greatest, answers), 4) }),
+    note: (answers) => t('result.stiffness_range', { most: number(stiffnessOf(greatest, answers), 4) }),
     isOptional: true,
   },
   {
