@@ -27,6 +27,11 @@ export const compatibilityOf = (design) => at(design, '/model/compatibility') ??
 
 export const isBall = (design) => at(design, '/drive/teeth/shape') === 'ball';
 
+/** Outer over largest inner radius of a ring, where the design gives no outer radius. */
+export const RIM = 1.2;
+
+export const outerRadiusOf = (design, { ring }) => at(design, '/parts/ring/outer_radius_mm') ?? RIM * (ring.root_radius_mm + (at(design, '/parts/ring/clearance_um') ?? 0) / 1000);
+
 /** Laws that `projection` takes: the others give way by more than in proportion to the force, or know more than one contact. */
 const PROJECTED = new Set(['linear', 'palmgren', 'fixed']);
 

@@ -1,6 +1,6 @@
 // What a designer decides by, as a table: each row is one entry here. A result that the service does not answer is not shown.
 
-import { at, isEstimated } from './design.js';
+import { at, isEstimated, outerRadiusOf } from './design.js';
 import { html, setAttributes, setProperties, setText, symbol } from './dom.js';
 import { DASH, difference, number, withUnit } from './format.js';
 import { unpublished } from './materials.js';
@@ -32,9 +32,6 @@ const contactRows = (field, name, sign, unit) =>
   CONTACTS.map(({ key, name: contact, index }) =>
     row(t('result.of', { what: name, part: contact.toLowerCase() }), `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field]),
   );
-
-/** Outer over inner radius of a ring that has none of its own. */
-const RIM = 1.2;
 
 export const least = (column) => column?.reduce((most, value) => Math.min(most, value));
 export const greatest = (column) => column?.reduce((most, value) => Math.max(most, value));
@@ -124,13 +121,16 @@ export function limitOf(answers) {
   return turnsPast ? t('result.turns_past') : t(`result.limit.${limit}`, { stress: withUnit(number(allowableAt(limit, answers)), 'MPa') });
 }
 
-export function heldOf({ sweep: { fingers } }) {
+export function heldOf({ design, sweep: { fingers } }) {
   const holding = t(`result.holding.${fingers.fingers}`);
-  return fingers.is_assumed ? t('result.assumed', { holding }) : holding;
+  return at(design, '/parts/carrier/fingers') ? holding : t('result.assumed', { holding });
 }
 
 /** Hardened steel cracks at the notch before it yields. */
-const isHardened = ({ design }) => [at(design, '/parts/carrier/strength')].some((strength) => strength?.hardened ?? strength === '100cr6');
+function isHardened({ design }) {
+  const strength = at(design, '/parts/carrier/strength');
+  return strength === '100cr6' || strength?.hardened === true;
+}
 
 const safetyRow = (label, sign, key, more) => row(label, sign, '', ({ sweep }) => sweep?.fingers?.[key], { significant: 3, isPast: ({ sweep }) => sweep.fingers[key] < 1, ...more });
 
@@ -205,7 +205,7 @@ export const GROUPS = [
   {
     title: t('result.group.sizes'),
     rows: [
-      row(t('quantity.outer_diameter_mm'), '', 'mm', ({ design, geometry }) => geometry && 2 * (at(design, '/parts/ring/outer_radius_mm') ?? RIM * (geometry.ring.root_radius_mm + (at(design, '/parts/ring/clearance_um') ?? 0) / 1000))),
+      row(t('quantity.outer_diameter_mm'), '', 'mm', ({ design, geometry }) => geometry && 2 * outerRadiusOf(design, geometry)),
       row(t('result.root_radius'), '', 'mm', ({ geometry }) => geometry?.ring.root_radius_mm),
       row(t('result.tip_radius'), '', 'mm', ({ geometry }) => geometry?.ring.tip_radius_mm),
       row(t('result.tooth_height'), '', 'mm', ({ geometry }) => geometry?.ring.tooth_height_mm),
