@@ -14,7 +14,7 @@ const peakRows = (field, name, sign, unit) =>
   CONTACTS.map(({ key, name: contact, index }) =>
     row(t('result.of', { what: name, part: contact.toLowerCase() }), `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field].value, {
       place: ({ sweep }) => sweep.peaks[key][field],
-      isPast: (answers) => field === 'stress_mpa' && isOverstressed(key, answers),
+      exceedsLimit: (answers) => field === 'stress_mpa' && isOverstressed(key, answers),
     }),
   );
 
@@ -132,7 +132,7 @@ function isHardened({ design }) {
   return strength === '100cr6' || strength?.hardened === true;
 }
 
-const safetyRow = (label, sign, key, more) => row(label, sign, '', ({ sweep }) => sweep?.fingers?.[key], { significant: 3, isPast: ({ sweep }) => sweep.fingers[key] < 1, ...more });
+const safetyRow = (label, sign, key, more) => row(label, sign, '', ({ sweep }) => sweep?.fingers?.[key], { significant: 3, exceedsLimit: ({ sweep }) => sweep.fingers[key] < 1, ...more });
 
 export const GROUPS = [
   {
@@ -146,7 +146,7 @@ export const GROUPS = [
     offer: '/load/allowable_stress_mpa',
     rows: [
       row(t('label./load/input_torque_nm'), 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
-      row(t('label./load/output_torque_nm'), 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { isPast: isOverloaded }),
+      row(t('label./load/output_torque_nm'), 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { exceedsLimit: isOverloaded }),
       row(t('result.limited_by'), '', '', ({ sweep }) => sweep?.torque_capacity?.limited_by, {
         text: limitOf,
       }),
@@ -251,7 +251,7 @@ export function show(entry, answers) {
   const value = entry.get(answers);
   if (value === undefined) return undefined;
   const text = entry.text?.(answers) ?? number(value, entry.significant ?? 5);
-  return { value, text, state: entry.isPast?.(answers) ? 'problem' : (entry.state?.(answers) ?? '') };
+  return { value, text, state: entry.exceedsLimit?.(answers) ? 'problem' : (entry.state?.(answers) ?? '') };
 }
 
 /** A value in its element; what is beyond its limit is marked. */

@@ -29,12 +29,12 @@ const MOST_COLUMNS = 6;
 const teethOf = ({ coincidence, sweep }) => sweep?.loaded_teeth_per_zone ?? coincidence?.teeth_in_mesh_per_zone;
 const stiffnessOf = (which, { sweep }) => sweep?.wind_up && which(sweep.wind_up.torsional_stiffness_nm_per_rad) / 1000;
 
-const STRESS = largestRow(t('result.largest_stress'), 'stress_mpa', 'MPa', { isPast: (answers) => CONTACTS.some(({ key }) => isOverstressed(key, answers)) });
+const STRESS = largestRow(t('result.largest_stress'), 'stress_mpa', 'MPa', { exceedsLimit: (answers) => CONTACTS.some(({ key }) => isOverstressed(key, answers)) });
 
 const CAPACITY = {
   ...row(t('result.capacity'), '', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { significant: 4 }),
   note: (answers) => t('result.capacity_limited', { limit: limitOf(answers) }),
-  isPast: isOverloaded,
+  exceedsLimit: isOverloaded,
   isOptional: true,
 };
 
@@ -58,7 +58,7 @@ const TILES = [
   {
     ...row(t('result.finger_safety'), '', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
     note: heldOf,
-    isPast: ({ sweep }) => sweep.fingers.safety < 1,
+    exceedsLimit: ({ sweep }) => sweep.fingers.safety < 1,
     isOptional: true,
   },
   {
