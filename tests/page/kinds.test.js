@@ -246,7 +246,7 @@ test('peaks state their model error', async () => {
     'The model’s own error: force −1 to 0\u202f%, stress −2 to +1\u202f%.',
     '',
     'The model’s own error: wind-up −2 to −1\u202f%, with bodies that are rigid below the depth of the contact law. ' +
-      'Besides, for a housed rim and fingers held at both ends: by the estimates −13 %, −25 to −20\u202f% in earlier calculations of elastic bodies.',
+      'Besides, for a housed rim and stiff fingers: by the estimates −12 %, −25 to −20\u202f% in earlier calculations of elastic bodies.',
     estimated,
   ]);
   await setDocument(page, { ...unnamed, parts: { carrier, ring: { clearance_um: 20 } } });
@@ -298,7 +298,7 @@ test('series compliance changes the answer', async () => {
   assert.notEqual(after.sweep.peaks.ring.force_n.value, before.sweep.peaks.ring.force_n.value);
 });
 
-test('button copies a compliance estimate into the design', async () => {
+test('button takes the compliance estimates into the design', async () => {
   const page = await bed.open();
   await setDocument(page, { drive: (await designOf(page)).drive, load: { input_torque_nm: 20 }, parts: { carrier: { fingers: 'held_at_one_end' } } });
   const before = await answered(page);
@@ -307,8 +307,7 @@ test('button copies a compliance estimate into the design', async () => {
   await page.click('button[aria-label="Finger held at one end: take over as series compliance"]');
   await settled(page);
   const after = await answered(page);
-  const { compliance_mm_per_n: estimate } = before.sweep.series_compliance_estimates.find(({ backing }) => backing === 'finger_at_one_end');
-  assert.equal(after.design.model.series_compliance_mm_per_n.carrier, Number(estimate.toPrecision(3)));
+  assert.equal(after.design.model.series_compliance_mm_per_n, 'estimated');
   assert.ok(!after.sweep.findings.some(({ code }) => code === 'slender_fingers'));
   assert.ok(after.sweep.peaks.carrier.force_n.value < before.sweep.peaks.carrier.force_n.value);
   // The choice of fingers can be removed.

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { after, afterEach, before, test } from 'node:test';
 import { createCanvas } from '@napi-rs/canvas';
 import { getDocument } from 'pdfjs-dist/legacy/build/pdf.mjs';
-import { enter, setDocument, testBed } from './harness.js';
+import { enter, setDocument, settled, testBed } from './harness.js';
 
 const bed = testBed({ before, after, afterEach });
 
@@ -105,10 +105,16 @@ test('report names findings, load, assumption and symbols on page one', async ()
   assert.equal(pages.length, 2);
   const first = pages[0].join('\n');
   for (const wanted of [/At 60.N·m input torque \(840/, /Stress above the/, /far ends joined,\s+assumed|assumed/, /ψ: position/, /http:\/\/127/, /1 \/ 2/]) assert.match(first, wanted);
-  // The enlarged tooth is the most loaded one, whatever is selected.
+  // The enlarged tooth is the most loaded one, whatever is selected before and after.
+  await settled(page);
+  const selected = await page.textContent('#tooth-name');
   await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
   const loads = await page.textContent('#tooth-state');
   assert.ok(Number(/up to (\d+)/.exec(loads)[1]) > 1500, loads);
+  assert.notEqual(await page.textContent('#tooth-name'), selected);
+  await page.evaluate(() => dispatchEvent(new Event('afterprint')));
+  await settled(page);
+  assert.equal(await page.textContent('#tooth-name'), selected);
 });
 
 test('reference of the same name is told apart', async () => {

@@ -10,7 +10,7 @@ const FIRST = { example: null };
 const tile = (page, name) => page.locator('#key-figures .tile:visible', { hasText: name });
 const material = (page, part) => page.locator(`select[aria-label="${part}: fill in a material"]`);
 
-test('heading names the load of the results', async () => {
+test('line above the tiles names the load', async () => {
   const page = await bed.open(FIRST);
   assert.match(await page.textContent('#load-line'), /^At 20.N·m input torque \(280.N·m at the output\)$/);
   const { load, ...others } = await designOf(page);
@@ -46,13 +46,40 @@ test('clearances have their group and their sums', async () => {
   assert.equal(new Set(helps).size, 4);
 });
 
+test('estimated compliance stands in its fields and is kept', async () => {
+  const page = await bed.open(FIRST);
+  await setDocument(page, { drive: (await designOf(page)).drive, load: { input_torque_nm: 20 }, model: { series_compliance_mm_per_n: 'estimated' } });
+  const { sweep } = await bed.server.answers(await designOf(page));
+  const [ring, carrier] = ['ring', 'carrier'].map((contact) => Number(sweep.series_compliance_estimates.find((each) => each.contact === contact && each.is_as_held).compliance_mm_per_n.toPrecision(3)));
+  await page.click('summary:has-text("Compliance of the supports")');
+  const series = '/model/series_compliance_mm_per_n';
+  assert.deepEqual(await Promise.all(['wave_generator', 'ring', 'carrier'].map((contact) => page.getAttribute(field(`${series}/${contact}`), 'placeholder'))), ['0', String(ring), String(carrier)]);
+  await page.click('#more');
+  assert.equal(await page.locator('button[aria-label$="take over as series compliance"] >> visible=true').count(), 0);
+  assert.match(await page.textContent('#table'), /Forces include it/);
+  await enter(page, `${series}/wave_generator`, '1e-6');
+  assert.deepEqual((await designOf(page)).model.series_compliance_mm_per_n, { wave_generator: 1e-6, ring, carrier });
+});
+
 test('tiles keep their notes beside a reference', async () => {
   const page = await bed.open(FIRST);
   await page.click('#keep');
   await enter(page, '/load/input_torque_nm', 30);
   assert.match(await tile(page, 'Largest stress').textContent(), /\+\d.*ring, ψ/);
   assert.match(await tile(page, 'Torque capacity').textContent(), /=limited by ring contact/);
-  assert.match(await tile(page, 'Torsional stiffness').textContent(), /kN·m\/rad.*least; up to/);
+  assert.match(await tile(page, 'Torsional stiffness').textContent(), /kN·m\/rad.*smallest; largest/);
+});
+
+test('design is shown before the materials arrive', async () => {
+  const page = await bed.open(FIRST);
+  let release;
+  const released = new Promise((resolve) => (release = resolve));
+  await page.route('**/v1/materials', (route) => released.then(() => route.continue()));
+  await page.reload();
+  await settled(page);
+  assert.equal(await material(page, 'Ring').isHidden(), true);
+  release();
+  await material(page, 'Ring').locator('option[value=bronze]').waitFor({ state: 'attached' });
 });
 
 test('material is recognised by its numbers', async () => {
@@ -61,7 +88,7 @@ test('material is recognised by its numbers', async () => {
   await material(page, 'Ring').selectOption('bronze');
   await settled(page);
   assert.equal(await material(page, 'Ring').inputValue(), 'bronze');
-  const note = /1500.MPa is not a published allowable stress of Bearing bronze.*\(ring\)/;
+  const note = /No allowable stress is published for Bearing bronze.*\(ring\); 1500.MPa is an assumption\./;
   for (const place of ['#findings', '#table']) assert.match(await page.textContent(place), note);
   await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
   assert.match(await page.textContent('#report'), /Bearing bronze/);
@@ -72,6 +99,8 @@ test('material is recognised by its numbers', async () => {
   const { materials, ...others } = await designOf(page);
   await setDocument(page, { ...others, materials: { carrier: materials.ring } });
   assert.equal(await material(page, 'Carrier').inputValue(), '');
+  await setDocument(page, { ...others, materials });
+  assert.equal(await material(page, 'Ring').inputValue(), '', 'the choice was that of another document');
   assert.doesNotMatch(await page.textContent('#findings'), note);
 });
 

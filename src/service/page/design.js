@@ -27,6 +27,11 @@ export const compatibilityOf = (design) => at(design, '/model/compatibility') ??
 
 export const isBall = (design) => at(design, '/drive/teeth/shape') === 'ball';
 
+/** Outer over largest inner radius of a ring, where the design gives no outer radius. */
+export const RIM = 1.2;
+
+export const outerRadiusOf = (design, { ring }) => at(design, '/parts/ring/outer_radius_mm') ?? RIM * (ring.root_radius_mm + (at(design, '/parts/ring/clearance_um') ?? 0) / 1000);
+
 /** Laws that `projection` takes: the others give way by more than in proportion to the force, or know more than one contact. */
 const PROJECTED = new Set(['linear', 'palmgren', 'fixed']);
 
@@ -109,6 +114,25 @@ export function withVirtualWork(design) {
   if (compatibilityOf(design) !== 'projection') return design;
   return changed(changed(design, '/model/stiffness/law', lawOf(design)), '/model/compatibility', 'virtual_work');
 }
+
+const SERIES = '/model/series_compliance_mm_per_n';
+
+/** Whether the service adds its estimates of the supports' compliance. */
+export const isEstimated = (design) => at(design, SERIES) === 'estimated';
+
+/** The estimates for the parts as they are held, by contact. */
+export const estimatesOf = ({ sweep }) =>
+  Object.fromEntries((sweep?.series_compliance_estimates ?? []).filter(({ is_as_held: isAsHeld }) => isAsHeld).map(({ contact, compliance_mm_per_n: compliance }) => [contact, Number(compliance.toPrecision(3))]));
+
+/** The document with the estimates taken over: as a word, or for one contact as a number where the others have numbers. */
+export function withEstimate(design, contact, answers) {
+  const isNumbers = isGiven(at(design, SERIES)) && !isEstimated(design);
+  return withVirtualWork(isNumbers ? changed(design, `${SERIES}/${contact}`, estimatesOf(answers)[contact]) : changed(design, SERIES, 'estimated'));
+}
+
+/** One number takes the place of the word: the other contacts then have their estimates as numbers. */
+export const withOtherEstimates = (design, before, answers) =>
+  withVirtualWork(isEstimated(before) ? changed(design, SERIES, { ...estimatesOf(answers), ...at(design, SERIES) }) : design);
 
 export const isGiven = (value) => (typeof value === 'object' && value !== null ? Object.values(value).some(isGiven) : Boolean(value));
 

@@ -14,6 +14,6 @@ export function showEffect(remedied, findings, answers) {
   const { code } = remedied.finding;
   const title = kindOf(remedied.finding);
   const effects = listed(effectOn(remedied.answers, answers).map(small));
-  const told = findings.some((finding) => finding.code === code) ? t('remedy.stays', { title }) : t('remedy.gone', { title });
-  setText(byId('effect-text'), effects ? `${told} ${sentence(effects)}` : told);
+  const outcome = findings.some((finding) => finding.code === code) ? t('remedy.stays', { title }) : t('remedy.gone', { title });
+  setText(byId('effect-text'), effects ? `${outcome} ${sentence(effects)}` : outcome);
 }

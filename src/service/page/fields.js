@@ -2,8 +2,8 @@
 // nothing else in the page knows field names except what is drawn from them.
 
 import {
-  USUAL_FRICTION, USUAL_SPEED_RPM, at, compatibilityOf, isBall, isGiven, lawOf, lobesOf, ratioOf, sizeOf, withDuty, withFriction, withLaw, withProjectedLaw, withRatio,
-  withRing, withVirtualWork,
+  USUAL_FRICTION, USUAL_SPEED_RPM, at, compatibilityOf, estimatesOf, isBall, isEstimated, isGiven, lawOf, lobesOf, ratioOf, sizeOf, withDuty, withFriction, withLaw,
+  withOtherEstimates, withProjectedLaw, withRatio, withRing, withVirtualWork,
 } from './design.js';
 import { choice, fieldsOf, flag, group, lines, number, oneOf, unlessSaid, variant, whole } from './field.js';
 import { number as format, withUnit } from './format.js';
@@ -76,7 +76,11 @@ const depth = (contact) =>
 const stiffness = (contact, symbol) => number(`/model/stiffness/${contact}_n_per_mm`, symbol, 'N/mm', { start: 500000, likely: 500000 });
 
 const compliance = (contact) =>
-  number(`/model/series_compliance_mm_per_n/${contact}`, '1/k', 'mm/N', { optional: () => '0', likely: 1e-6, adjust: withVirtualWork });
+  number(`/model/series_compliance_mm_per_n/${contact}`, '1/k', 'mm/N', {
+    optional: (design, answers) => (isEstimated(design) && estimatesOf(answers)[contact]) || '0',
+    likely: 1e-6,
+    adjust: withOtherEstimates,
+  });
 
 const modified = (key, symbol, more) => number(`/modification/${key}`, symbol, 'µm', { optional: () => '0', step: 1, adjust: withVirtualWork, ...more });
 const turned = (part, symbol) => modified(`${part}_rotation_arcsec`, symbol, { unit: '″' });
@@ -292,9 +296,8 @@ export const GROUPS = [
   {
     ...group('/model/series_compliance_mm_per_n'),
     summary: (design) => {
-      const series = at(design, '/model/series_compliance_mm_per_n') ?? {};
-      if (series === 'estimated') return t('summary.estimated');
-      return Object.values(series).some((value) => value) ? t('summary.given') : t('summary.nothing');
+      if (isEstimated(design)) return t('summary.estimated');
+      return isGiven(at(design, '/model/series_compliance_mm_per_n')) ? t('summary.given') : t('summary.nothing');
     },
     fields: [
       compliance('wave_generator'), compliance('ring'), compliance('carrier'),

@@ -15,8 +15,8 @@ export class FindingsList {
 
   /** `assumptions` are sentences that hold beside the findings. */
   show(findings, hasReasons, assumptions) {
-    const told = findings.length > 0 || assumptions.length > 0 ? assumptions.join(' ') : t('findings.none');
-    setText(this.#none, hasReasons ? t('findings.reasons_first') : told);
+    const text = findings.length > 0 || assumptions.length > 0 ? assumptions.join(' ') : t('findings.none');
+    setText(this.#none, hasReasons ? t('findings.reasons_first') : text);
     setChildren(this.container, [...findings.map((finding) => this.#noteOf(finding)), this.#none]);
   }
 

@@ -111,6 +111,7 @@ export class Form {
       select.replaceChildren(html('option', { value: '', disabled: true }, t('form.fill_in')), ...knownMaterials().map(({ name, title }) => html('option', { value: name }, title)));
       element.hidden = knownMaterials().length === 0;
     }
+    for (const filling of this.#fillings) this.#showFilling(filling);
   }
 
   /** The material that has a part's numbers; of several that share them the one that was chosen. */
@@ -130,9 +131,9 @@ export class Form {
     return this.#buildNumber(field);
   }
 
-  /** `adjust` changes what follows from it. */
+  /** `adjust` changes what follows from it, perhaps from the design and the answers before. */
   #edit(pointer, value, adjust = (design) => design) {
-    this.#replace(adjust(changed(this.#design, pointer, value)), pointer);
+    this.#replace(adjust(changed(this.#design, pointer, value), this.#design, this.#answers), pointer);
   }
 
   /** The document's value may be none, or no text. */
@@ -332,7 +333,7 @@ export class Form {
     this.#take(entry);
   }
 
-  /** Shows a document; sliders span anew around its values where `respan` says that it is another one. */
+  /** Shows a document; where `respan` says that it is another one, sliders span anew around its values and chosen materials are forgotten. */
   setDesign(design, { respan = false } = {}) {
     if (!isSame(design, this.#design)) this.notes.told = undefined;
     this.#design = design;
@@ -341,7 +342,10 @@ export class Form {
       setText(summary, group.summary?.(design, group) ?? '');
       if (told) setText(told, group.told(design));
     }
-    for (const filling of this.#fillings) this.#showFilling(filling);
+    for (const filling of this.#fillings) {
+      if (respan) filling.chosen = '';
+      this.#showFilling(filling);
+    }
   }
 
   /** Shows the option that is chosen; what no design like this one can have is not offered. */

@@ -6,7 +6,7 @@ import { Accuracy } from './accuracy.js';
 import { copy } from './clipboard.js';
 import { Comparison } from './comparison.js';
 import { converted } from './convert.js';
-import { changed, isSame, withVirtualWork } from './design.js';
+import { isSame, withEstimate } from './design.js';
 import { listenToDocument } from './document-dialog.js';
 import { byId, oncePerFrame, setProperties, setText } from './dom.js';
 import { Drawings } from './drawings.js';
@@ -63,6 +63,7 @@ const state = {
   view: 'design',
 };
 let motion;
+let lastResult;
 let gesture;
 
 const history = new History();
@@ -111,7 +112,7 @@ const results = new Results(
   { table: byId('table'), more: byId('more') },
   (peak) => turning.stopAtPeak(peak),
   goTo,
-  ({ pointer, value }) => setDesign(withVirtualWork(changed(state.design, pointer, value))),
+  (contact, answers) => setDesign(withEstimate(state.design, contact, answers)),
 );
 
 const findingsList = new FindingsList(byId('findings'), { labelOf, goTo, remedyButton: (finding) => form.remedyButton(finding) });
@@ -270,6 +271,7 @@ function fromAddress({ atStart = false } = {}) {
 // ---- what the service says
 
 function onResult({ design, answers, problems, solveMs }) {
+  lastResult = { design, answers, problems, solveMs };
   state.problems = problems;
   state.reasons = reasonsOf(problems);
   const isDrawn = answers.geometry !== undefined;
@@ -392,18 +394,11 @@ function print(isPrinting) {
   if (isPrinting) {
     byId('findings-table').replaceChildren(...findingsTable(state.findings));
     byId('report').replaceChildren(...reportOf(...reported(), location.href));
-    if (motion) showMostLoaded();
   }
+  turning.print(isPrinting);
+  if (isPrinting && motion) turning.show(mechanism.render(turning));
   document.documentElement.classList.toggle('printing', isPrinting);
   plots.print(isPrinting);
-}
-
-/** A reader of paper cannot choose another tooth. */
-function showMostLoaded() {
-  const largest = ({ stress }) => Math.max(...Object.values(stress));
-  const [most] = motion.loaded(turning.inputDeg).sort((one, other) => largest(other) - largest(one));
-  if (most) turning.select(most.tooth);
-  turning.show(mechanism.render(turning));
 }
 
 // ---- the start
@@ -480,14 +475,19 @@ async function load() {
   examples.offer();
 }
 
+function offerMaterials({ materials }) {
+  learnMaterials(materials);
+  form.offerMaterials();
+  if (lastResult) onResult(lastResult);
+}
+
 async function start() {
   byId('glossary').append(glossary());
   byId('position-term').append(term('position'));
   listen();
   await load();
   // Names save typing; without them the numbers can still be entered.
-  learnMaterials((await getJson('v1/materials').catch(() => ({ materials: [] }))).materials);
-  form.offerMaterials();
+  getJson('v1/materials').then(offerMaterials, () => {});
   find.restore();
   if (!fromAddress({ atStart: true })) {
     const { first } = examples;

@@ -28,9 +28,9 @@ export function unpublished(design) {
   const allowable = at(design, '/load/allowable_stress_mpa');
   if (allowable === undefined) return [];
   const stressOf = (part) => (typeof allowable === 'object' ? (allowable[part] ?? Math.max(...Object.values(allowable))) : allowable);
-  const told = PARTS.map((part) => ({ part, materials: materialsOf(design, part) }))
+  const assumed = PARTS.map((part) => ({ part, materials: materialsOf(design, part) }))
     .filter(({ materials }) => materials.length > 0 && materials.every(({ allowable_stress_mpa: published }) => published === undefined))
     .map(({ part, materials }) => ({ part: t(`part.${part}`).toLowerCase(), stress: withUnit(number(stressOf(part)), 'MPa'), material: titleOf(materials) }));
-  const kinds = Map.groupBy(told, ({ stress, material }) => `${stress} ${material}`);
+  const kinds = Map.groupBy(assumed, ({ stress, material }) => `${stress} ${material}`);
   return [...kinds.values()].map((alike) => t('materials.unpublished', { ...alike[0], parts: listed(alike.map(({ part }) => part)) }));
 }

@@ -1,6 +1,6 @@
 // Findings whose remedy is a value: what one press changes.
 
-import { at, changed, withVirtualWork } from './design.js';
+import { at, changed, estimatesOf, withEstimate, withVirtualWork } from './design.js';
 import { number, withUnit } from './format.js';
 import { t } from './texts.js';
 
@@ -13,11 +13,7 @@ const unbored = { label: t('remedy.unbored'), change: (design) => changed(design
 const virtualWork = { label: t('remedy.virtual_work'), change: withVirtualWork };
 const johnson = { label: t('remedy.johnson'), change: (design) => changed(withVirtualWork(design), '/model/stiffness', { law: 'johnson' }) };
 
-/** The estimated compliance of a part as it is held, as series compliance. */
-const backing = (contact, ...backings) => (_, { sweep }) => {
-  const found = sweep?.series_compliance_estimates?.find(({ backing: of, is_as_held: isAsHeld }) => isAsHeld && backings.includes(of));
-  return found && { label: t('remedy.compliance'), change: (design) => changed(withVirtualWork(design), `/model/series_compliance_mm_per_n/${contact}`, Number(found.compliance_mm_per_n.toPrecision(3))) };
-};
+const compliance = (contact) => (_, answers) => estimatesOf(answers)[contact] && { label: t('remedy.compliance'), change: (design) => withEstimate(design, contact, answers) };
 
 /** The torque capacity, at the shaft where the design gives its torque. */
 function capacity(_, { sweep }, design) {
@@ -40,8 +36,8 @@ const REMEDIES = {
   palmgren_beyond_steel: () => johnson,
   projection_on_steep_flank: () => virtualWork,
   projection_with_gap: () => virtualWork,
-  slender_fingers: backing('carrier', 'finger_at_both_ends', 'finger_at_one_end', 'finger_joined_at_far_end', 'finger_on_web'),
-  soft_rim: backing('ring', 'housed_rim', 'free_rim'),
+  slender_fingers: compliance('carrier'),
+  soft_rim: compliance('ring'),
   bearing_load_above_half_rating: ({ value }) => set('/friction/wave_generator/bearing_load_rating_n', above(2 * value, 10), 'N'),
   stress_above_allowable: capacity,
   finger_overstressed: capacity,

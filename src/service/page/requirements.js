@@ -1,7 +1,7 @@
 // What a drive must do, as its form asks for it, and the searches that follow: one for each kind of drive that may be, so that few numbers
 // are free in each.
 
-import { at, changed } from './design.js';
+import { RIM, at, changed } from './design.js';
 import * as field from './field.js';
 import { number as digits } from './format.js';
 import { CONTACTS } from './motion.js';
@@ -15,9 +15,6 @@ const number = (name, symbol, unit, more) => field.number(`${ROOT}/${name}`, sym
 const flag = (name) => field.flag(`${ROOT}/${name}`);
 
 const asked = (requirements, name) => at(requirements, `${ROOT}/${name}`);
-
-/** The ring is as thick as drawings make it: its root radius times this is its outer radius. */
-const RIM = 1.2;
 
 /** Below this share of a slot's width a finding warns of the wall between slots; steeper flanks than this angle it warns of too. */
 const LEAST_WALL = 0.25;

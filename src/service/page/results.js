@@ -1,6 +1,6 @@
 // What a designer decides by, as a table: each row is one entry here. A result that the service does not answer is not shown.
 
-import { at } from './design.js';
+import { at, isEstimated, outerRadiusOf } from './design.js';
 import { html, setAttributes, setProperties, setText, symbol } from './dom.js';
 import { DASH, difference, number, withUnit } from './format.js';
 import { unpublished } from './materials.js';
@@ -14,7 +14,7 @@ const peakRows = (field, name, sign, unit) =>
   CONTACTS.map(({ key, name: contact, index }) =>
     row(t('result.of', { what: name, part: contact.toLowerCase() }), `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field].value, {
       place: ({ sweep }) => sweep.peaks[key][field],
-      isPast: (answers) => field === 'stress_mpa' && isOverstressed(key, answers),
+      exceedsLimit: (answers) => field === 'stress_mpa' && isOverstressed(key, answers),
     }),
   );
 
@@ -32,9 +32,6 @@ const contactRows = (field, name, sign, unit) =>
   CONTACTS.map(({ key, name: contact, index }) =>
     row(t('result.of', { what: name, part: contact.toLowerCase() }), `${sign}_${index}`, unit, ({ sweep }) => sweep?.peaks[key][field]),
   );
-
-/** Outer over inner radius of a ring that has none of its own. */
-const RIM = 1.2;
 
 export const least = (column) => column?.reduce((most, value) => Math.min(most, value));
 export const greatest = (column) => column?.reduce((most, value) => Math.max(most, value));
@@ -97,16 +94,14 @@ const lossRows = [
 
 const BACKINGS = ['cam_on_bore', 'housed_rim', 'free_rim', 'finger_at_both_ends', 'finger_at_one_end', 'finger_joined_at_far_end', 'finger_on_web'];
 
-/** What parts behind the contacts are estimated to give way, to be taken over as series compliance. */
+/** What parts behind the contacts are estimated to give way; those of the parts as they are held can be taken over. */
 const backingRows = BACKINGS.map((key) => {
   const of = ({ sweep }) => sweep?.series_compliance_estimates?.find(({ backing }) => backing === key);
-  return row(t(`result.backing.${key}`), '', 'mm/N', (answers) => of(answers)?.compliance_mm_per_n, {
+  const label = t(`result.backing.${key}`);
+  return row(label, '', 'mm/N', (answers) => of(answers)?.compliance_mm_per_n, {
     significant: 3,
-    taken: (answers) => {
-      const { contact, compliance_mm_per_n: compliance, share } = of(answers);
-      const text = share === undefined ? t('result.take_over') : t('result.take_over_adds', { percent: number(100 * share, 2) });
-      return { pointer: `/model/series_compliance_mm_per_n/${contact}`, value: Number(compliance.toPrecision(3)), text };
-    },
+    name: (answers) => (of(answers).share === undefined ? label : t('result.backing_adds', { label, percent: number(100 * of(answers).share, 2) })),
+    taken: (answers) => (of(answers)?.is_as_held && !isEstimated(answers.design) ? of(answers).contact : undefined),
   });
 });
 
@@ -126,15 +121,18 @@ export function limitOf(answers) {
   return turnsPast ? t('result.turns_past') : t(`result.limit.${limit}`, { stress: withUnit(number(allowableAt(limit, answers)), 'MPa') });
 }
 
-export function heldOf({ sweep: { fingers } }) {
+export function heldOf({ design, sweep: { fingers } }) {
   const holding = t(`result.holding.${fingers.fingers}`);
-  return fingers.is_assumed ? t('result.assumed', { holding }) : holding;
+  return at(design, '/parts/carrier/fingers') ? holding : t('result.assumed', { holding });
 }
 
 /** Hardened steel cracks at the notch before it yields. */
-const isHardened = ({ design }) => [at(design, '/parts/carrier/strength')].some((strength) => strength?.hardened ?? strength === '100cr6');
+function isHardened({ design }) {
+  const strength = at(design, '/parts/carrier/strength');
+  return strength === '100cr6' || strength?.hardened === true;
+}
 
-const safetyRow = (label, sign, key, more) => row(label, sign, '', ({ sweep }) => sweep?.fingers?.[key], { significant: 3, isPast: ({ sweep }) => sweep.fingers[key] < 1, ...more });
+const safetyRow = (label, sign, key, more) => row(label, sign, '', ({ sweep }) => sweep?.fingers?.[key], { significant: 3, exceedsLimit: ({ sweep }) => sweep.fingers[key] < 1, ...more });
 
 export const GROUPS = [
   {
@@ -148,7 +146,7 @@ export const GROUPS = [
     offer: '/load/allowable_stress_mpa',
     rows: [
       row(t('label./load/input_torque_nm'), 'M_0', 'N·m', ({ sweep }) => sweep?.torque_capacity?.input_torque_nm),
-      row(t('label./load/output_torque_nm'), 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { isPast: isOverloaded }),
+      row(t('label./load/output_torque_nm'), 'M_G', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { exceedsLimit: isOverloaded }),
       row(t('result.limited_by'), '', '', ({ sweep }) => sweep?.torque_capacity?.limited_by, {
         text: limitOf,
       }),
@@ -207,7 +205,7 @@ export const GROUPS = [
   {
     title: t('result.group.sizes'),
     rows: [
-      row(t('quantity.outer_diameter_mm'), '', 'mm', ({ design, geometry }) => geometry && 2 * (at(design, '/parts/ring/outer_radius_mm') ?? RIM * (geometry.ring.root_radius_mm + (at(design, '/parts/ring/clearance_um') ?? 0) / 1000))),
+      row(t('quantity.outer_diameter_mm'), '', 'mm', ({ design, geometry }) => geometry && 2 * outerRadiusOf(design, geometry)),
       row(t('result.root_radius'), '', 'mm', ({ geometry }) => geometry?.ring.root_radius_mm),
       row(t('result.tip_radius'), '', 'mm', ({ geometry }) => geometry?.ring.tip_radius_mm),
       row(t('result.tooth_height'), '', 'mm', ({ geometry }) => geometry?.ring.tooth_height_mm),
@@ -233,7 +231,7 @@ export const GROUPS = [
     isMore: true,
     // To work with, not to report: what was taken over stands in the design.
     isOnScreenAlone: true,
-    told: ({ sweep }) => (sweep?.series_compliance_estimates?.length > 0 ? t('result.estimated') : ''),
+    told: ({ design, sweep }) => (sweep?.series_compliance_estimates?.length > 0 ? t(isEstimated(design) ? 'result.estimated_included' : 'result.estimated') : ''),
     rows: backingRows,
   },
   {
@@ -253,7 +251,7 @@ export function show(entry, answers) {
   const value = entry.get(answers);
   if (value === undefined) return undefined;
   const text = entry.text?.(answers) ?? number(value, entry.significant ?? 5);
-  return { value, text, state: entry.isPast?.(answers) ? 'problem' : (entry.state?.(answers) ?? '') };
+  return { value, text, state: entry.exceedsLimit?.(answers) ? 'problem' : (entry.state?.(answers) ?? '') };
 }
 
 /** A value in its element; what is beyond its limit is marked. */
@@ -277,7 +275,7 @@ export class Results {
   #told = [];
 
   /** `onShow({ input_angle_deg, position_deg })` when a peak's place is picked, `onAsk(pointer)` when a result is wanted that the
-   *  design has to ask for, `onTake({ pointer, value })` when an estimate is taken over into the design. */
+   *  design has to ask for, `onTake(contact, answers)` when an estimate is taken over into the design. */
   constructor({ table, more }, onShow, onAsk, onTake) {
     this.table = table;
     more.addEventListener('click', () => {
@@ -305,10 +303,10 @@ export class Results {
         const place = entry.place && html('button', { type: 'button', class: 'link number', title: t('result.show') });
         const scope = entry.scoped && html('span');
         const name = html('span', {}, entry.label);
-        const taken = entry.taken && html('button', { type: 'button', class: 'link number', 'aria-label': t('result.take_over_as', { what: entry.label }) });
+        const taken = entry.taken && html('button', { type: 'button', class: 'link number', 'aria-label': t('result.take_over_as', { what: entry.label }) }, t('result.take_over'));
         const cell = { entry, name, taken, scope, value, unit, reference, referenceUnit, delta, place };
         place?.addEventListener('click', () => onShow(cell.at));
-        taken?.addEventListener('click', () => onTake(entry.taken(cell.answers)));
+        taken?.addEventListener('click', () => onTake(entry.taken(cell.answers), cell.answers));
         const kind = entry.text ? 'numeric words' : 'numeric';
         const line = html(
           'tr',
@@ -352,8 +350,7 @@ export class Results {
       cell.at = place && shown && entry.place(answers);
       if (cell.taken) {
         cell.answers = answers;
-        setProperties(cell.taken, { hidden: !shown });
-        if (shown) setText(cell.taken, entry.taken(answers).text);
+        setProperties(cell.taken, { hidden: !entry.taken(answers) });
       }
       if (place) setProperties(place, { hidden: !cell.at });
       if (cell.at) {

@@ -75,8 +75,8 @@ export async function evaluate(design, signal) {
   const drawn = { ...design, profile: { ...design.profile, extent: 'tooth' } };
   const { answer, problem, solveMs } = await ask('v1/design', drawn, { signal, kind: 'design' });
   const { geometry, coincidence_degree: coincidence, sweep, problems = {} } = answer ?? {};
-  const told = problem ? [problem] : Object.values(problems).map(problemInWords);
-  return { design, answers: { design, zones: zonesOf(design), geometry, coincidence, sweep }, problems: told, solveMs: solveMs ?? 0 };
+  const listed = problem ? [problem] : Object.values(problems).map(problemInWords);
+  return { design, answers: { design, zones: zonesOf(design), geometry, coincidence, sweep }, problems: listed, solveMs: solveMs ?? 0 };
 }
 
 /** Documents that came or are under way, and how long the others are waited for. */

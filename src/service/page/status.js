@@ -35,11 +35,11 @@ export class Status {
     const banner = byId('impossible');
     setProperties(banner, { hidden: reasons.length === 0 });
     if (banner.hidden) return;
-    const told = reasons.map((reason) => ({ pointer: reason.pointer, text: this.#worded(reason) }));
+    const items = reasons.map((reason) => ({ pointer: reason.pointer, text: this.#worded(reason) }));
     setText(byId('impossible-title'), sentence(reasons[0].title));
-    setText(byId('impossible-first'), told.length > 1 ? t('status.and_more', { reason: told[0].text, count: told.length - 1 }) : told[0].text);
+    setText(byId('impossible-first'), items.length > 1 ? t('status.and_more', { reason: items[0].text, count: items.length - 1 }) : items[0].text);
     const item = ({ pointer, text }) => html('li', {}, pointer ? html('button', { type: 'button', class: 'link', onclick: () => this.goTo(pointer) }, text) : text);
-    byId('impossible-all').replaceChildren(html('p', {}, kept), html('ul', {}, told.map(item)));
+    byId('impossible-all').replaceChildren(html('p', {}, kept), html('ul', {}, items.map(item)));
   }
 
   /** What is told where there is nothing wrong. */

@@ -212,7 +212,7 @@ export const FIELDS = {
     '/parts': 'Drawings, the strength of the carrier’s fingers and the estimated compliance of the supports depend on these. Forces on flat-sided teeth depend on the carrier’s radii too.',
     carrier: 'By default a tenth of the annulus between cam and ring tips stays free on either side.',
     '/find/bears': 'A Hertz stress, without a factor of safety. Bearing steel and case-hardened steel bear 1500 MPa (ISO 281, ISO 6336-5), alloy steel of 300 HV about 770 MPa. Fingers of the carrier have a disc at one end and a ring that joins their far ends.',
-    '/find/build': 'Teeth never touch each other, stay inside the carrier and meet flanks that are not too steep. Forces include the estimated compliance of fingers and rim.',
+    '/find/build': 'Teeth never touch each other, stay inside the carrier and meet flanks that are not too steep. Forces include the estimated compliance of fingers and rim, except for balls.',
     '/find/goals': 'One to four. With several goals there is no single best drive: the search shows the best trade-offs.',
   },
   /** What stands in an empty field. */
@@ -302,7 +302,7 @@ export const FIELDS = {
     '/load/duty': 'Several loads, one on each line: torque, speed of the wave generator, share of the running time.',
     '/load/input_speed_rpm': 'Speed of the wave generator. With friction it gives sliding speeds, power loss and wear.',
     '/load/cycle': 'Whether the torque keeps its sense. A reversed load tires the fingers sooner.',
-    '/load/allowable_stress_mpa': 'Hertz stress that the contacts may have. The torque capacity is the torque at which a contact reaches it or a finger fails. 1500 MPa are for hardened surfaces; quenched and tempered steel of 300 HV bears about 770 MPa.',
+    '/load/allowable_stress_mpa': 'Hertz stress that the contacts may have. The torque capacity is the torque at which a contact reaches it or a finger fails. 1500 MPa is for hardened surfaces; quenched and tempered steel of 300 HV bears about 770 MPa.',
     '/model/compatibility': 'How the deformations of a tooth’s three contacts add up to the rotation of the wave generator.',
     '/model/stiffness': 'How far two bodies approach each other under the force between them.',
     '/model/stiffness/depth_mm/*': 'How far below the contact the body counts as rigid. The deeper, the softer the contact.',

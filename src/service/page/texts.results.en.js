@@ -4,7 +4,7 @@ const EXACT = { source: 'exact', basis: 'The limit is geometry, exact.' };
 const RULE_OF_THUMB = { source: 'rule of thumb', basis: 'The limit is a rule of thumb: it marks where to look again.' };
 
 export const RESULTS = {
-  materials: { unpublished: '{stress} is not a published allowable stress of {material} ({parts}).' },
+  materials: { unpublished: 'No allowable stress is published for {material} ({parts}); {stress} is an assumption.' },
   result: {
     of: '{what}, {part}',
     yes: 'yes',
@@ -51,7 +51,7 @@ export const RESULTS = {
     at_load: 'At {input} input torque ({output} at the output)',
     at_duty: 'At the hardest load of the duty: {input} input torque ({output} at the output)',
     stiffness: 'Torsional stiffness',
-    stiffness_up_to: 'least; up to {most}',
+    stiffness_range: 'smallest; largest {most}',
     capacity: 'Torque capacity',
     capacity_limited: 'limited by {limit}',
     contacts_only: 'The carrier’s fingers are not among these limits.',
@@ -113,17 +113,18 @@ export const RESULTS = {
     shear_stress: 'Largest shear stress',
     shear_depth: 'Its depth',
     estimated: 'Estimated from the parts as they are made. Forces leave it out until you take it over.',
+    estimated_included: 'Estimated from the parts as they are made. Forces include it for the supports of this design.',
     backing: {
       cam_on_bore: 'Cam on its bore',
       housed_rim: 'Rim in a housing',
-      free_rim: 'Rim with nothing around it',
+      free_rim: 'Rim without a housing',
       finger_at_both_ends: 'Finger held at both ends',
       finger_at_one_end: 'Finger held at one end',
       finger_joined_at_far_end: 'Finger joined at its far end',
       finger_on_web: 'Finger on a web in its middle',
     },
     take_over: 'take over',
-    take_over_adds: 'take over, adds {percent} %',
+    backing_adds: '{label}, adds {percent} %',
     take_over_as: '{what}: take over as series compliance',
     torque_balance: 'Torque balance, residual',
     period_closure: 'Period closure, residual',
@@ -141,7 +142,7 @@ export const RESULTS = {
       housed: 'a housed rim and stiff fingers',
       slender_fingers: 'slender fingers',
       fingers_at_one_end: 'fingers held at one end',
-      free_rim: 'a rim with nothing around it',
+      free_rim: 'a rim without a housing',
     },
     beyond: {
       law: 'other sizes and loads under its law',
@@ -438,7 +439,7 @@ export const RESULTS = {
       tests: 'The deflection of the ring’s rim, as an estimated share of the deflection of a tooth at its three contacts, against a fifth.',
       source: 'measured',
       basis: 'In finite elements of a drive in a housing, all supports together added about a fifth.',
-      why: 'The wind-up comes out too small; a ring with nothing around it follows the wave generator.',
+      why: 'The wind-up comes out too small; a ring without a housing follows the wave generator.',
     },
     palmgren_beyond_steel: {
       title: 'Palmgren’s law is for steel',

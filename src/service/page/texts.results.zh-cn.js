@@ -4,7 +4,7 @@ const EXACT = { source: '精确', basis: '界限由几何精确给出。' };
 const RULE_OF_THUMB = { source: '经验值', basis: '界限为经验值：它指出需要再看一看的地方。' };
 
 export const RESULTS = {
-  materials: { unpublished: '{stress} 不是{material}（{parts}）公布的许用应力。' },
+  materials: { unpublished: '{material}（{parts}）没有公布的许用应力；{stress} 为假定值。' },
   result: {
     of: '{what}（{part}）',
     yes: '是',
@@ -51,7 +51,7 @@ export const RESULTS = {
     at_load: '输入转矩 {input}（输出端 {output}）时',
     at_duty: '载荷谱中最重的载荷：输入转矩 {input}（输出端 {output}）时',
     stiffness: '扭转刚度',
-    stiffness_up_to: '最小值；最大 {most}',
+    stiffness_range: '最小值；最大 {most}',
     capacity: '转矩容量',
     capacity_limited: '限制因素：{limit}',
     contacts_only: '这些限值不含离散齿体的指。',
@@ -113,6 +113,7 @@ export const RESULTS = {
     shear_stress: '最大切应力',
     shear_depth: '最大切应力深度',
     estimated: '按零件结构尺寸估算；采用之前不计入受力。',
+    estimated_included: '按零件结构尺寸估算；受力已计入本设计支承方式的估算值。',
     backing: {
       cam_on_bore: '带孔凸轮',
       housed_rim: '壳体内的轮缘',
@@ -123,7 +124,7 @@ export const RESULTS = {
       finger_on_web: '中间腹板上的指',
     },
     take_over: '采用',
-    take_over_adds: '采用，增加 {percent} %',
+    backing_adds: '{label}，增加 {percent} %',
     take_over_as: '{what}：采用为串联柔度',
     torque_balance: '转矩平衡残差',
     period_closure: '周期闭合残差',
@@ -348,15 +349,15 @@ export const RESULTS = {
     friction_beyond_measured: {
       title: '摩擦超出验证范围',
       tests: '最大摩擦系数以及沿波发生器的总摩擦，与损失已同精确平衡比较过的范围之比较。',
-      source: '实测',
+      source: '精确平衡计算',
       basis: '界限为已比较范围的终点：0.1，沿波发生器为 0.05。',
       why: '损失按一阶计算，超出该范围的误差未知。',
     },
     efficiency_uncertain: {
       title: '效率不确定',
       tests: '刚轮固定时的效率与精确平衡的效率可能相差多少，与 0.05 之比较。',
-      source: '实测',
-      basis: '误差为在这种摩擦系数和损失下测得的最大值；界限为经验值。',
+      source: '精确平衡计算',
+      basis: '误差为在这种摩擦系数和损失下与精确平衡比较所得的最大值；界限为经验值。',
       why: '损失总归很大。装在轴承上的波发生器损失小得多，其效率也更可靠。',
     },
     bearing_load_above_half_rating: {
@@ -400,7 +401,7 @@ export const RESULTS = {
     projection_on_steep_flank: {
       title: '陡齿廓上使用投影法',
       tests: '啮合齿廓的最大压力角与 30° 之比较。',
-      source: '实测',
+      source: '有限元计算',
       basis: '界限介于按弹性体计算过的若干方案之间。',
       why: '刚啮入的离散齿误差更大。',
     },
@@ -421,21 +422,21 @@ export const RESULTS = {
     projection_with_gap: {
       title: '有间隙时使用投影法',
       tests: '接触处的最大间隙与零之比较。',
-      source: '实测',
+      source: '有限元计算',
       basis: '有间隙的方案已按弹性体计算过。',
       why: '刚轮处间隙 10 µm 时，最大接触力偏大 4 至 109 %。',
     },
     slender_fingers: {
       title: '离散齿体的指细长',
       tests: '指的变形（估算）与离散齿三处接触变形之比，与五分之一之比较。',
-      source: '实测',
+      source: '有限元计算',
       basis: '在壳体支承传动的有限元计算中，全部支承合计增加约五分之一。',
       why: '所得最大接触力偏大，微小转角偏小。',
     },
     soft_rim: {
       title: '刚轮轮缘柔软',
       tests: '刚轮轮缘的变形（估算）与离散齿三处接触变形之比，与五分之一之比较。',
-      source: '实测',
+      source: '有限元计算',
       basis: '在壳体支承传动的有限元计算中，全部支承合计增加约五分之一。',
       why: '所得微小转角偏小；外侧无支承的刚轮会随波发生器变形。',
     },

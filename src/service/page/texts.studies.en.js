@@ -61,7 +61,7 @@ export const STUDIES = {
     intro: 'Enter ratio, torque and available space. The search evaluates thousands of drives and shows the best trade-offs.',
     requirements: 'Requirements',
     find: 'Find drives',
-    earlier: 'The drives below keep the earlier limits.',
+    earlier: 'These drives were found with the earlier requirements. Search again.',
     drive_title: '{name}, {label}',
     incomplete: 'Some requirements are missing or impossible: see the marked fields.',
     rounding: 'Rounding to 0.01 mm: drive {index} of {count}',

@@ -60,7 +60,7 @@ export const STUDIES = {
   find: {
     intro: '输入传动比、转矩和可用空间。搜索计算数千个方案，给出最好的折中方案。',
     requirements: '要求',
-    earlier: '以下方案满足的是先前的限制。',
+    earlier: '以下方案按先前的要求搜索得到，请重新搜索。',
     find: '搜索方案',
     drive_title: '{name}，{label}',
     incomplete: '有的要求缺失或不可能，请看标出的字段。',

@@ -29,12 +29,12 @@ const MOST_COLUMNS = 6;
 const teethOf = ({ coincidence, sweep }) => sweep?.loaded_teeth_per_zone ?? coincidence?.teeth_in_mesh_per_zone;
 const stiffnessOf = (which, { sweep }) => sweep?.wind_up && which(sweep.wind_up.torsional_stiffness_nm_per_rad) / 1000;
 
-const STRESS = largestRow(t('result.largest_stress'), 'stress_mpa', 'MPa', { isPast: (answers) => CONTACTS.some(({ key }) => isOverstressed(key, answers)) });
+const STRESS = largestRow(t('result.largest_stress'), 'stress_mpa', 'MPa', { exceedsLimit: (answers) => CONTACTS.some(({ key }) => isOverstressed(key, answers)) });
 
 const CAPACITY = {
   ...row(t('result.capacity'), '', 'N·m', ({ sweep }) => sweep?.torque_capacity?.output_torque_nm, { significant: 4 }),
   note: (answers) => t('result.capacity_limited', { limit: limitOf(answers) }),
-  isPast: isOverloaded,
+  exceedsLimit: isOverloaded,
   isOptional: true,
 };
 
@@ -58,12 +58,12 @@ const TILES = [
   {
     ...row(t('result.finger_safety'), '', '', ({ sweep }) => sweep?.fingers?.safety, { significant: 3 }),
     note: heldOf,
-    isPast: ({ sweep }) => sweep.fingers.safety < 1,
+    exceedsLimit: ({ sweep }) => sweep.fingers.safety < 1,
     isOptional: true,
   },
   {
     ...row(t('result.stiffness'), '', 'kN·m/rad', (answers) => stiffnessOf(least, answers), { significant: 4 }),
-    note: (answers) => t('result.stiffness_up_to', { most: number(stiffnessOf(greatest, answers), 4) }),
+    note: (answers) => t('result.stiffness_range', { most: number(stiffnessOf(greatest, answers), 4) }),
     isOptional: true,
   },
   {
@@ -103,8 +103,8 @@ export const effectOn = (before, after) =>
 export class Tiles {
   #tiles = [];
 
-  constructor(heading, container) {
-    Object.assign(this, { heading, container });
+  constructor(loadLine, container) {
+    Object.assign(this, { loadLine, container });
     for (const entry of TILES) {
       const value = html('data', { class: 'value number' });
       const unit = entry.unit && !entry.text ? html('span', { class: 'unit' }, entry.unit) : undefined;
@@ -125,7 +125,7 @@ export class Tiles {
   /** Shows answers, and their differences from those of a reference. What has no answer keeps its place but no number; `isHeld` says that no
    *  tile may go, because a slider is held. */
   update(answers, reference, isHeld) {
-    setText(this.heading, loadInWords(answers));
+    setText(this.loadLine, loadInWords(answers));
     for (const { entry, tile, name, value, delta, note, scope } of this.#tiles) {
       if (scope) setText(scope, scopeOf(entry, answers));
       if (entry.name) setText(name, entry.name(answers));

@@ -19,6 +19,8 @@ export class Turning {
   from = 'ring';
   isPlaying = false;
   #motion;
+  /** The tooth that is selected again after printing. */
+  #onScreen;
   /** While it plays: when the last picture was drawn, and how far it still turns. */
   #playing = {};
 
@@ -62,6 +64,19 @@ export class Turning {
     const { installed } = this.#motion;
     this.selected = ((tooth % installed) + installed) % installed;
     this.onTurn();
+  }
+
+  /** A reader of paper cannot choose a tooth: it shows the most loaded one, and the screen then the selected one again. */
+  print(isPrinting) {
+    if (isPrinting && this.#motion) {
+      const largest = ({ stress }) => Math.max(...Object.values(stress));
+      const [most] = this.#motion.loaded(this.inputDeg).sort((one, other) => largest(other) - largest(one));
+      this.#onScreen ??= this.selected;
+      if (most) this.select(most.tooth);
+    } else if (this.#onScreen !== undefined) {
+      this.select(this.#onScreen);
+      this.#onScreen = undefined;
+    }
   }
 
   play(isPlaying) {
