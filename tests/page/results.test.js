@@ -61,6 +61,18 @@ test('estimated compliance stands in its fields and is kept', async () => {
   assert.deepEqual((await designOf(page)).model.series_compliance_mm_per_n, { wave_generator: 1e-6, ring, carrier });
 });
 
+test('estimate keeps the compliance that is given elsewhere', async () => {
+  const page = await bed.open();
+  const parts = { carrier: { fingers: 'held_at_one_end' } };
+  await setDocument(page, { drive: (await designOf(page)).drive, load: { input_torque_nm: 20 }, parts, model: { series_compliance_mm_per_n: { wave_generator: 1e-6 } } });
+  await page.click('#more');
+  await page.click('button[aria-label="Finger held at one end: take over as series compliance"]');
+  await settled(page);
+  const { carrier, ...others } = (await designOf(page)).model.series_compliance_mm_per_n;
+  assert.ok(carrier > 1e-6);
+  assert.deepEqual(others, { wave_generator: 1e-6 });
+});
+
 test('tiles keep their notes beside a reference', async () => {
   const page = await bed.open(FIRST);
   await page.click('#keep');
