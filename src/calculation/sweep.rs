@@ -329,6 +329,7 @@ impl Question for Sweep {
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts).chain(&of_fingers);
         let causes = Causes {
             wave_generator_moves: load.parameters().wave_generator_moves,
+            fingers: backings.support().fingers,
             gap_fields: checked.gap_fields(),
             ..Causes::default()
         };
