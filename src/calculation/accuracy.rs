@@ -252,7 +252,7 @@ impl Converged {
         let CheckedAccuracy { drive, deviations, backings, max_states, .. } = checked;
         let sweep = sweep_with_deviations(drive, load, deviations, Points::finest(*max_states), stop)?;
         let shares = Shares::of(drive, load, backings, &sweep.peaks);
-        let parts = shares.as_ref().map(|shares| (backings, shares));
+        let parts = Some((backings, shares.as_ref()));
         let ModelError { measured, beyond, .. } = model_error::of(drive, load, deviations, &sweep, parts)?;
         let is_like = beyond.iter().all(|reason| matches!(reason, Beyond::Law));
         let expected_error = measured.filter(|_| is_like).map(|measured| measured.force.largest());

@@ -404,7 +404,7 @@ impl Design {
             return Err(violations);
         }
         Ok(FingerParameters {
-            fingers: *fingers,
+            fingers: fingers.unwrap_or_default(),
             fillet_radius_mm: *finger_fillet_radius_mm,
             strength: strength.map(StrengthDocument::numbers),
             cycle: self.load.as_ref().map_or_else(LoadCycle::default, |load| load.cycle),

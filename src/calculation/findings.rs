@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 use toothwave_solver::findings;
 pub use toothwave_solver::findings::{FindingCode, Severity};
+use toothwave_solver::fingers::Fingers;
 use toothwave_solver::losses::MEASURED_TO;
 use toothwave_solver::{Contact, Drive, Finding, Parameter, SolveError, ToothShape, WaveGenerator};
 use utoipa::ToSchema;
@@ -62,6 +63,8 @@ pub(crate) struct Causes {
     pub(crate) ring_equidistant: bool,
     /// True if the wave generator moves under its teeth.
     pub(crate) wave_generator_moves: bool,
+    /// Support of the carrier's fingers.
+    pub(crate) fingers: Fingers,
     /// Fields of the document that open or close gaps.
     pub(crate) gap_fields: &'static [&'static str],
 }
@@ -92,6 +95,14 @@ impl Text {
             ToothShape::Ball { .. } => (&[LOAD, RADIUS], "make the balls larger"),
             ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. } => (&[LOAD, WIDTH, RADIUS], "widen the teeth"),
         };
+        let support = match causes.fingers {
+            Fingers::HeldAtOneEnd => "held at one end",
+            Fingers::HeldAtBothEnds => "held at both ends",
+            Fingers::FarEndsJoined => "held at one end and joined at the other",
+            Fingers::WebInTheMiddle => "held by a web in the middle",
+        };
+        let hold_both_ends =
+            if causes.fingers == Fingers::HeldAtBothEnds { "" } else { "hold the fingers at both ends, " };
         let contact = contact.unwrap_or(Contact::WaveGenerator);
         let (at, mate) = (contact_name(contact).replace('_', " "), format!("/materials/{}", contact_name(contact)));
         let groove = pointer(Parameter::GrooveRadius(contact));
@@ -204,15 +215,23 @@ impl Text {
             Code::SlenderFingers => text(
                 &["/parts/carrier/fingers", "/model/series_compliance_mm_per_n/carrier", WIDTH],
                 "",
-                "the carrier's fingers, whose far ends a ring joins unless `parts` specifies another support, bend under their teeth. Estimate: they add this share to the deflection at a tooth's contacts. Forces and wind-up leave it out",
-                "give the estimate as the carrier's series compliance, hold the fingers at both ends, or make them shorter or thicker",
+                format!(
+                    "the carrier's fingers, {support}, bend under their teeth: by an estimate they add this share to the deflection at a tooth's contacts. Forces and wind-up leave it out"
+                ),
+                format!(
+                    "give the estimate as the carrier's series compliance, {hold_both_ends}or make the fingers shorter or thicker"
+                ),
             ),
             Code::SoftRim => text(
                 &["/parts/ring/rim", "/parts/ring/outer_radius_mm", "/model/series_compliance_mm_per_n/ring"],
                 "",
                 format!(
-                    "the ring's rim, {}: estimate: it adds this share to the deflection at a tooth's contacts. Forces and wind-up leave it out",
-                    if is_grave { "without a housing, bends" } else { "even if housed, gives way" }
+                    "{}: by an estimate it adds this share to the deflection at a tooth's contacts. Forces and wind-up leave it out",
+                    if is_grave {
+                        "without a housing the ring's rim bends"
+                    } else {
+                        "the ring's rim deflects even in a housing"
+                    }
                 ),
                 if is_grave {
                     "house the ring or make its rim thicker, or give the estimate as the ring's series compliance"
@@ -356,7 +375,9 @@ impl Text {
                 ],
                 "",
                 "the safety of the carrier's fingers is below 1: they yield or break by fatigue at their feet",
-                "lower the torque, hold the fingers at both ends, make them thicker or shorter, enlarge their fillets, or choose a stronger material",
+                format!(
+                    "lower the torque, {hold_both_ends}make the fingers thicker or shorter, enlarge their fillets, or choose a stronger material"
+                ),
             ),
             Code::StressAboveAllowable => text(
                 &[&["/load/allowable_stress_mpa"], stressed, &[&*mate]].concat(),

@@ -310,7 +310,7 @@ impl Question for Sweep {
         let of_projection = findings::of_projection(drive, load).map_err(SolveError::from)?;
         let shares = Shares::of(drive, load, backings, &sweep.peaks);
         let of_backing = shares.as_ref().map_or_else(Vec::new, findings::of_backing);
-        let parts = shares.as_ref().map(|shares| (backings, shares));
+        let parts = Some((backings, shares.as_ref()));
         go_on()?;
         let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
         go_on()?;
@@ -329,6 +329,7 @@ impl Question for Sweep {
         let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts).chain(&of_fingers);
         let causes = Causes {
             wave_generator_moves: load.parameters().wave_generator_moves,
+            fingers: backings.support().fingers,
             gap_fields: checked.gap_fields(),
             ..Causes::default()
         };

@@ -11,5 +11,4 @@ pub mod http;
 pub mod ops;
 pub mod page;
 pub mod studies;
-#[cfg(unix)]
 pub mod unix;

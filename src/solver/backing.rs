@@ -251,7 +251,7 @@ impl Backings {
     /// [`NotConverged`] from the geometry.
     pub fn load_peak_over_mean(&self, drive: &Drive, p: &LoadParameters) -> Result<f64, NotConverged> {
         let Some(beam) = self.finger else { return Ok(1.0) };
-        let parameters = FingerParameters { fingers: Some(self.support.fingers), ..FingerParameters::default() };
+        let parameters = FingerParameters { fingers: self.support.fingers, ..FingerParameters::default() };
         Ok(CarrierFingers::new(drive, beam, parameters, p)?.load_peak_over_mean())
     }
 

@@ -31,8 +31,8 @@ const MOMENT_OF_LOAD_BESIDE_FILLET: f64 = 0.25;
 /// Parameters of the fingers.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FingerParameters {
-    /// Support, if given.
-    pub fingers: Option<Fingers>,
+    /// Support.
+    pub fingers: Fingers,
     /// Radius of the fillet at the foot; by default [`FILLET_SHARE_OF_THICKNESS`].
     pub fillet_radius_mm: Option<f64>,
     /// Strength of the carrier's material. Without it there is no safety.
@@ -47,7 +47,6 @@ pub struct FingerParameters {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CarrierFingers {
     beam: FingerBeam,
-    fingers: Fingers,
     parameters: FingerParameters,
     /// Load along the finger, if its support makes it uneven and is given.
     overhang: Option<Overhang>,
@@ -129,13 +128,12 @@ impl CarrierFingers {
         parameters: FingerParameters,
         p: &LoadParameters,
     ) -> Result<Self, NotConverged> {
-        let fingers = parameters.fingers.unwrap_or_default();
         let material = &p.materials.carrier;
         let overhang = |beam: &FingerBeam| {
             Ok::<_, NotConverged>(Overhang::of_beam(beam, material, slice_compliance_mm2_per_n(drive, p)?))
         };
         let length_mm = beam.length_mm;
-        let (overhang, moment_nmm_per_n) = match fingers {
+        let (overhang, moment_nmm_per_n) = match parameters.fingers {
             Fingers::HeldAtOneEnd => {
                 let overhang = overhang(&beam)?;
                 (Some(overhang), overhang.moment_over_force_length * length_mm)
@@ -147,13 +145,13 @@ impl CarrierFingers {
             }
             Fingers::HeldAtBothEnds | Fingers::FarEndsJoined => (None, length_mm / 12.0),
         };
-        let moment_nmm_per_nm = match fingers {
+        let moment_nmm_per_nm = match parameters.fingers {
             // The mean force of all fingers, M_S/(Z' d), sways them all.
             Fingers::FarEndsJoined => 1e3 * length_mm / 4.0 / (beam.count as f64 * mean_center_radius_mm(drive)),
             Fingers::HeldAtOneEnd | Fingers::HeldAtBothEnds | Fingers::WebInTheMiddle => 0.0,
         };
         let slot = SlotStress::of(drive, p);
-        Ok(Self { beam, fingers, parameters, overhang, moment_nmm_per_n, moment_nmm_per_nm, slot })
+        Ok(Self { beam, parameters, overhang, moment_nmm_per_n, moment_nmm_per_nm, slot })
     }
 
     /// Returns the beam.
@@ -161,14 +159,9 @@ impl CarrierFingers {
         &self.beam
     }
 
-    /// Returns the support, given or assumed.
+    /// Returns the support.
     pub const fn fingers(&self) -> Fingers {
-        self.fingers
-    }
-
-    /// Returns true if the support is assumed.
-    pub const fn is_assumed(&self) -> bool {
-        self.parameters.fingers.is_none()
+        self.parameters.fingers
     }
 
     /// Returns the radius of the fillet at the foot.

@@ -331,7 +331,7 @@ pub fn case_of(drive: &Drive, load: &LoadCase, deviations: &Deviations) -> Case 
     Case { has_gaps: load.has_gaps() || !deviations.is_nil(), has_pointed_tips: has_pointed_tips(drive) }
 }
 
-/// Returns the expected model error for this drive, load and sweep, with these parts and their shares.
+/// Returns the expected model error for this drive, load and sweep, with these parts and, if known, their shares.
 ///
 /// ```
 /// use toothwave_solver::sweep::{Points, sweep};
@@ -352,7 +352,7 @@ pub fn of(
     load: &LoadCase,
     deviations: &Deviations,
     sweep: &Sweep,
-    parts: Option<(&Backings, &Shares)>,
+    parts: Option<(&Backings, Option<&Shares>)>,
 ) -> Result<ModelError, NotConverged> {
     let p = load.parameters();
     let case = case_of(drive, load, deviations);
@@ -392,10 +392,10 @@ pub fn of(
         (wind_up_deg > range.wind_up_deg, Beyond::WindUp),
         (p.modification.first().is_some() || !deviations.is_nil(), Beyond::Modification),
         (p.series_compliance_mm_per_n.iter().any(|(_, &compliance)| compliance > 0.0), Beyond::SeriesCompliance),
-        (parts.is_some_and(|(_, shares)| is_soft(shares)), Beyond::SoftBacking),
+        (parts.and_then(|(_, shares)| shares).is_some_and(is_soft), Beyond::SoftBacking),
         (widest_mm > range.half_width_over_tooth_radius * tooth_radius_mm, Beyond::HalfWidth),
     ];
     let beyond: Vec<_> = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
-    let held = parts.and_then(|(backings, shares)| Held::of(backings.support(), shares));
+    let held = parts.and_then(|(backings, shares)| Held::of(backings.support(), shares?));
     Ok(ModelError { measured, held, range, is_within: beyond.is_empty(), beyond })
 }

@@ -232,9 +232,9 @@ async fn tolerance_with_too_many_states_is_refused() {
 #[tokio::test]
 async fn sweep_reports_model_error_and_its_range() {
     let service = Service::new();
-    let told = async |document: &Value| service.post("/v1/sweep", document).await.found()["model_error"].clone();
+    let model_error = async |document: &Value| service.post("/v1/sweep", document).await.found()["model_error"].clone();
     let at_both_ends = json!({ "carrier": { "fingers": "held_at_both_ends" } });
-    let stiff = told(&with(&shortest(), "/parts", at_both_ends)).await;
+    let stiff = model_error(&with(&shortest(), "/parts", at_both_ends)).await;
     assert_eq!((&stiff["is_within"], &stiff["beyond"]), (&json!(true), &json!([])));
     assert_eq!(stiff["measured"]["force"], json!({ "low": -0.01, "high": 0.0 }));
     let case = json!({
@@ -248,15 +248,15 @@ async fn sweep_reports_model_error_and_its_range() {
     });
     assert_eq!(stiff["measured"]["case"], case);
     // The paper's model has a larger error, with a gap a far larger one.
-    let paper = told(&spelled_out()).await;
+    let paper = model_error(&spelled_out()).await;
     assert_eq!(paper["measured"]["force"], json!({ "low": 0.01, "high": 0.08 }));
-    let gap = told(&with(&spelled_out(), "/parts", json!({ "ring": { "clearance_um": 12.0 } }))).await;
+    let gap = model_error(&with(&spelled_out(), "/parts", json!({ "ring": { "clearance_um": 12.0 } }))).await;
     assert_eq!(gap["measured"]["case"]["has_gaps"], true);
     assert!(gap["measured"]["force"]["high"].as_f64().unwrap() > 0.5);
     // Laws other than Johnson's were measured on three drives only.
     assert_eq!((&paper["is_within"], &paper["beyond"]), (&json!(false), &json!(["law"])));
     assert_eq!((&gap["is_within"], &gap["beyond"]), (&json!(false), &json!(["law", "gap"])));
-    let pointed = told(&undercut()).await;
+    let pointed = model_error(&undercut()).await;
     assert_eq!(pointed["measured"]["case"]["has_pointed_tips"], true);
     assert_eq!(pointed["measured"]["case"]["ring_teeth_bend"], true);
     assert_eq!(pointed["measured"]["force"], json!({ "low": -0.01, "high": 0.0 }));
@@ -266,15 +266,17 @@ async fn sweep_reports_model_error_and_its_range() {
     // If slots run into each other, there is no finger to estimate.
     let thick = with(&shortest(), "/drive/teeth/radius_mm", json!(6.7));
     let open = with(&thick, "/parts", json!({ "carrier": { "inner_radius_mm": 58.5, "outer_radius_mm": 61.0 } }));
-    assert_eq!(told(&open).await["beyond"], json!(["soft_backing"]));
+    assert_eq!(model_error(&open).await["beyond"], json!(["soft_backing"]));
     assert_eq!(
         (&stiff["held"]["case"], &stiff["held"]["wind_up"]),
         (&json!("housed"), &json!({ "low": -0.25, "high": -0.2 }))
     );
-    let fixed = told(&with(&shortest(), "/model", json!({ "stiffness": crate::designs::fixed(4e5, 4e5, 4e5) }))).await;
+    let fixed =
+        model_error(&with(&shortest(), "/model", json!({ "stiffness": crate::designs::fixed(4e5, 4e5, 4e5) }))).await;
     assert!(fixed.get("measured").is_none() && fixed["beyond"] == json!(["law"]));
     let balls =
-        told(&with(&shortest(), "/drive/teeth", json!({ "shape": "ball", "count": 28, "radius_mm": 5.0 }))).await;
+        model_error(&with(&shortest(), "/drive/teeth", json!({ "shape": "ball", "count": 28, "radius_mm": 5.0 })))
+            .await;
     assert_eq!(balls["beyond"][0], "law");
     assert_eq!(balls["beyond"][1], "tooth_shape");
     assert_eq!(stiff["range"]["lobes"], 2);

@@ -489,15 +489,29 @@ async fn slender_fingers_and_soft_rim_state_estimated_share() {
         let taken = with(&document, "/model", json!({ "series_compliance_mm_per_n": series }));
         assert!(!codes_of(&findings(&taken).await).contains(&code.to_owned()));
     }
-    // If nothing is said, far ends are joined: such a cage is slender, fingers held at both ends are not.
+    // Fingers held at both ends are not slender here; the default cage is.
     let both = json!({ "carrier": { "fingers": "held_at_both_ends" }, "ring": { "rim": "housed" } });
     assert!(findings(&held(both)).await.is_empty());
-    let assumed = finding(&held(json!({})), "slender_fingers").await;
-    assert_eq!(
-        assumed,
-        finding(&held(json!({ "carrier": { "fingers": "far_ends_joined" } })), "slender_fingers").await
-    );
-    assert_eq!(assumed["severity"], "info");
+    assert_eq!(finding(&held(json!({})), "slender_fingers").await["severity"], "info");
+}
+
+#[tokio::test]
+async fn slender_fingers_name_support_and_possible_advice() {
+    let long = |fingers: &str| {
+        let document = held(json!({ "carrier": { "fingers": fingers } }));
+        with(&document, "/drive/teeth/width_mm", json!(40.0))
+    };
+    for (fingers, support) in [
+        ("held_at_one_end", "held at one end,"),
+        ("held_at_both_ends", "held at both ends,"),
+        ("far_ends_joined", "joined at the other,"),
+        ("web_in_the_middle", "a web in the middle,"),
+    ] {
+        let found = finding(&long(fingers), "slender_fingers").await;
+        assert!(found["detail"].as_str().unwrap().contains(support), "{found}");
+        let holds = found["advice"].as_str().unwrap().contains("hold the fingers at both ends");
+        assert_eq!(holds, fingers != "held_at_both_ends", "{found}");
+    }
 }
 
 #[tokio::test]
@@ -541,11 +555,11 @@ async fn contact_beyond_groove_warns_at_each_groove() {
     // Width at the edges of a groove of depth t: a chord of its circle.
     let (groove_mm, depth_mm) = (3.001_f64, 1.5_f64);
     let edge_mm = (groove_mm * groove_mm - (groove_mm - depth_mm) * (groove_mm - depth_mm)).sqrt();
-    let mut told = findings(&document).await;
-    told.retain(|finding| finding["code"] == "contact_beyond_groove");
+    let mut found = findings(&document).await;
+    found.retain(|finding| finding["code"] == "contact_beyond_groove");
     // The slots hold a ball as closely, but with a smaller force.
-    assert!(half_length_mm("carrier") < edge_mm && told.len() == 2, "{told:?}");
-    for (finding, contact) in told.iter().zip(["wave_generator", "ring"]) {
+    assert!(half_length_mm("carrier") < edge_mm && found.len() == 2, "{found:?}");
+    for (finding, contact) in found.iter().zip(["wave_generator", "ring"]) {
         assert_numbers(finding, half_length_mm(contact), edge_mm, "mm");
         let groove = format!("/drive/teeth/groove_radius_mm/{contact}");
         assert_eq!((&finding["severity"], &finding["pointers"]), (&json!("warning"), &json!([groove, "/load"])));
@@ -566,10 +580,10 @@ async fn each_groove_not_drawn_is_information() {
         ("tooth", vec![]),
         ("assembly", vec!["ring", "carrier", "wave_generator"]),
     ] {
-        let mut told = findings_at(&format!("/v1/drawings/{part}"), &document).await;
-        told.retain(|finding| finding["code"] == "groove_not_drawn");
-        assert_eq!(told.len(), contacts.len(), "{part}: {told:?}");
-        for (finding, contact) in told.iter().zip(contacts) {
+        let mut found = findings_at(&format!("/v1/drawings/{part}"), &document).await;
+        found.retain(|finding| finding["code"] == "groove_not_drawn");
+        assert_eq!(found.len(), contacts.len(), "{part}: {found:?}");
+        for (finding, contact) in found.iter().zip(contacts) {
             assert_numbers(finding, 3.1, 3.0, "mm");
             let groove = format!("/drive/teeth/groove_radius_mm/{contact}");
             assert_eq!((&finding["severity"], &finding["pointers"]), (&json!("info"), &json!([groove])));

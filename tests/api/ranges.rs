@@ -132,6 +132,29 @@ fn fields() -> Vec<Field> {
     fields
 }
 
+#[test]
+fn typical_fields_have_known_bounds() {
+    let found: HashMap<_, _> = ranges().map(|(pointer, Range { low, high, .. })| (pointer, [low, high])).collect();
+    for (pointer, bounds) in [
+        ("/drive/teeth/radius_mm", [1e-6, 1e6]),
+        ("/drive/teeth/count", [2.0, 1e4]),
+        ("/sweep/samples", [1.0, 1e7]),
+        ("/load/input_torque_nm", [1e-12, 1e15]),
+        ("/load/input_speed_rpm", [1e-6, 1e6]),
+        ("/load/allowable_stress_mpa/ring", [1e-3, 1e6]),
+        ("/friction/ring/coefficient", [0.0, 1.0]),
+        ("/materials/teeth/youngs_modulus_gpa", [1e-3, 1e5]),
+        ("/model/stiffness/ring_n_per_mm", [1e-3, 1e15]),
+        ("/parts/ring/clearance_um", [0.0, 1e6]),
+        ("/modification/slot_wall_um", [-1e6, 1e6]),
+        ("/modification/ring_tip_relief/power", [0.1, 100.0]),
+        ("/deviations/slot_angle_arcsec/0", [-1e5, 1e5]),
+        ("/assembly/input_angle_deg", [-1e7, 1e7]),
+    ] {
+        assert_eq!(found[pointer], bounds, "{pointer}");
+    }
+}
+
 /// Returns the exceeded limit if the service reports one at this field.
 async fn limit_exceeded(field: &Field, value: f64) -> Option<f64> {
     // With a small limit, a sweep of many samples is refused quickly and only for that.

@@ -57,6 +57,7 @@ fn defaults(document: &Value) -> Vec<(String, Value)> {
         put(&mut written, "/drive/teeth/installed", count);
     }
     put(&mut written, "/parts/ring/rim", json!("housed"));
+    put(&mut written, "/parts/carrier/fingers", json!("far_ends_joined"));
     put(&mut written, "/model/stiffness", serde_json::to_value(design.stiffness()).unwrap());
     for rate in ["wave_generator", "ring", "carrier"].map(|part| format!("/friction/wear_rate_mm3_per_nm/{part}")) {
         if design.friction.is_some() && written.pointer(&rate).is_none() {

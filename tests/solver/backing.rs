@@ -9,7 +9,7 @@ use toothwave_solver::backing::{Backing, Backings, Estimate, HeldStrip, Rim, Rim
 use toothwave_solver::drive::Draft;
 use toothwave_solver::findings;
 use toothwave_solver::fingers::{FOOT_IN_DISC, FingerBeam, Fingers};
-use toothwave_solver::model_error::{self, Beyond, Held, HeldCase};
+use toothwave_solver::model_error::{self, Beyond, Held, HeldCase, ModelError};
 use toothwave_solver::parts::PartsParameters;
 use toothwave_solver::{
     Contact, ContactLaw, Deviations, DriveParameters, Finding, FindingCode, LoadCase, LoadParameters, Material,
@@ -224,17 +224,17 @@ fn only_soft_parts_are_findings() {
     assert_eq!(found(&PAPER_5_1, &johnson(20.0), AT_BOTH_ENDS), Some(Vec::new()));
     let joined = found(&PAPER_5_1, &johnson(20.0), Support::default()).unwrap();
     let one_end = found(&PAPER_5_1, &johnson(20.0), AT_ONE_END).unwrap();
-    let told = |found: &[Finding], wanted: (FindingCode, Severity), least: f64, most: f64| {
+    let assert_finding = |found: &[Finding], wanted: (FindingCode, Severity), least: f64, most: f64| {
         let [Finding { code, severity, value, .. }] = *found else { panic!("{found:?}") };
         assert!((code, severity) == wanted && (least..most).contains(&value), "{found:?}");
     };
-    told(&joined, (FindingCode::SlenderFingers, Severity::Info), 0.2, 0.5);
-    told(&one_end, (FindingCode::SlenderFingers, Severity::Warning), 1.0, f64::INFINITY);
+    assert_finding(&joined, (FindingCode::SlenderFingers, Severity::Info), 0.2, 0.5);
+    assert_finding(&one_end, (FindingCode::SlenderFingers, Severity::Warning), 1.0, f64::INFINITY);
     let free = found(&PAPER_5_1, &johnson(20.0), FREE).unwrap();
-    told(&free, (FindingCode::SoftRim, Severity::Warning), 10.0, f64::INFINITY);
+    assert_finding(&free, (FindingCode::SoftRim, Severity::Warning), 10.0, f64::INFINITY);
     // Those of case 5.2 are a millimetre and a half high: slender however they are held.
     let low = found(&PAPER_5_2, &johnson(3.0), AT_BOTH_ENDS).unwrap();
-    told(&low, (FindingCode::SlenderFingers, Severity::Info), 0.2, 1.0);
+    assert_finding(&low, (FindingCode::SlenderFingers, Severity::Info), 0.2, 1.0);
     // Under other laws wind-up is further off by itself.
     let fixed = ContactLaw::Fixed(PerContact { wave_generator: 4e5, ring: 4e5, carrier: 4e5 });
     for law in [fixed, ContactLaw::Linear, ContactLaw::Palmgren] {
@@ -242,16 +242,17 @@ fn only_soft_parts_are_findings() {
     }
 }
 
+fn error_of_model(parameters: &DriveParameters, load: &LoadParameters, support: Support) -> ModelError {
+    let sweep = swept(parameters, load, 50);
+    let shares = shares(parameters, load, support);
+    let case = LoadCase::new(load).unwrap();
+    let backings = backings(parameters, &PartsParameters::default(), support);
+    let parts = Some((&backings, shares.as_ref()));
+    model_error::of(&drive(parameters), &case, &Deviations::default(), &sweep, parts).unwrap()
+}
+
 #[test]
 fn model_error_reports_how_parts_are_held() {
-    let held = |parameters: &DriveParameters, load: LoadParameters, support: Support| {
-        let sweep = swept(parameters, &load, 50);
-        let shares = shares(parameters, &load, support);
-        let case = LoadCase::new(&load).unwrap();
-        let backings = backings(parameters, &PartsParameters::default(), support);
-        let parts = shares.as_ref().map(|shares| (&backings, shares));
-        model_error::of(&drive(parameters), &case, &Deviations::default(), &sweep, parts).unwrap()
-    };
     for (parameters, torque_nm, support, case, is_soft) in [
         (PAPER_5_1, 20.0, AT_BOTH_ENDS, HeldCase::Housed, false),
         (PAPER_5_1, 20.0, Support::default(), HeldCase::SlenderFingers, true),
@@ -259,7 +260,7 @@ fn model_error_reports_how_parts_are_held() {
         (PAPER_5_1, 20.0, FREE, HeldCase::FreeRim, true),
         (PAPER_5_2, 3.0, Support::default(), HeldCase::SlenderFingers, true),
     ] {
-        let error = held(&parameters, johnson(torque_nm), support);
+        let error = error_of_model(&parameters, &johnson(torque_nm), support);
         let Some(Held { case: found, wind_up, estimated_wind_up }) = error.held else { panic!("{support:?}") };
         assert_eq!(found, case);
         assert_eq!(wind_up.is_none(), case == HeldCase::SlenderFingers);
@@ -267,7 +268,17 @@ fn model_error_reports_how_parts_are_held() {
         assert_eq!(error.beyond.contains(&Beyond::SoftBacking), is_soft, "{support:?}");
     }
     let linear = LoadParameters { law: ContactLaw::Linear, ..johnson(20.0) };
-    assert_eq!(held(&PAPER_5_1, linear, FREE).held, None);
+    assert_eq!(error_of_model(&PAPER_5_1, &linear, FREE).held, None);
+}
+
+/// The load at the foot of a finger widens a contact under every law.
+#[test]
+fn uneven_load_widens_contacts_under_other_laws() {
+    let linear = LoadParameters { law: ContactLaw::Linear, ..johnson(80.0) };
+    for (support, is_beyond) in [(AT_BOTH_ENDS, false), (AT_ONE_END, true)] {
+        let found = error_of_model(&PAPER_5_1, &linear, support).beyond.contains(&Beyond::HalfWidth);
+        assert_eq!(found, is_beyond, "{support:?}");
+    }
 }
 
 #[test]

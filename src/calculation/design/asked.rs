@@ -1,7 +1,7 @@
 //! Settings of the endpoints: input angles of a sweep, sampling of profiles, parts and assembly of drawings.
 
 use serde::{Deserialize, Serialize};
-use toothwave_solver::backing::Rim;
+use toothwave_solver::backing::{Rim, Support};
 use toothwave_solver::fingers::Fingers;
 use toothwave_solver::profile::{Extent, ProfileParameters};
 use utoipa::ToSchema;
@@ -79,9 +79,11 @@ pub struct PartsDocument {
 }
 
 impl PartsDocument {
-    /// Removes a support that is the default. That of fingers stays, since answers say whether it is assumed.
+    /// Removes the supports that are the default.
     pub(super) fn leave_out_default_supports(&mut self) {
-        self.ring.rim.take_if(|rim| *rim == Rim::Housed);
+        let Support { fingers, rim } = Support::default();
+        self.ring.rim.take_if(|given| *given == rim);
+        self.carrier.fingers.take_if(|given| *given == fingers);
     }
 
     /// Returns what a drawing reads: no supports, no strength.

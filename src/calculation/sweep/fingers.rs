@@ -20,8 +20,6 @@ use crate::sweep::CheckedSweep;
 pub struct FingersAnswer {
     /// Support of the fingers.
     pub fingers: Fingers,
-    /// True if `parts.carrier.fingers` is left out, so that the support is assumed.
-    pub is_assumed: bool,
     /// Thickness of a finger across the slots, at the middle of its height, in mm.
     pub thickness_mm: f64,
     /// Height of a finger along the radius, in mm.
@@ -55,7 +53,6 @@ impl FingersAnswer {
         let beam = fingers.beam();
         Self {
             fingers: fingers.fingers(),
-            is_assumed: fingers.is_assumed(),
             thickness_mm: beam.thickness_mm,
             height_mm: beam.height_mm,
             fillet_radius_mm: fingers.fillet_radius_mm(),
@@ -70,9 +67,8 @@ impl FingersAnswer {
     }
 
     pub(super) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let assumed = if self.is_assumed { ", as assumed" } else { "" };
         let support = word(&self.fingers).replace('_', " ");
-        writeln!(writer, "\nfingers of the carrier              {support}{assumed}")?;
+        writeln!(writer, "\nfingers of the carrier              {support}")?;
         writeln!(writer, "stress at their feet                {:.1} MPa", self.stress_mpa)?;
         if let Some((yielding, fatigue)) = self.yield_safety.zip(self.fatigue_safety) {
             writeln!(writer, "safety against yield, fatigue       {yielding:.2}, {fatigue:.2}")?;
