@@ -81,7 +81,7 @@ impl Template {
             }
             // A strength by its name, or estimated compliances.
             if (2..path.len()).any(|depth| matches!(base.at(&path[..depth]), Some(Tree::Text(_)))) {
-                let detail = format!("the base gives a word for the object of `{pointer}`. Give its fields instead");
+                let detail = format!("the base gives a word instead of the object with `{pointer}`. Give the object");
                 return Err(fault(&at(pointer), FieldCode::ConflictingFields, detail));
             }
             let (domain, choices) = match asked {

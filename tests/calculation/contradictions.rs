@@ -251,3 +251,12 @@ fn study_is_converted_with_its_pointers() {
     });
     assert_eq!(convert(&old), plain(&new));
 }
+
+#[test]
+fn impossible_tooth_radius_is_one_error() {
+    let mut document = case_5_2();
+    document["drive"]["teeth"]["radius_mm"] = json!(-5.0);
+    let refused = Sweep.ask(document.to_string().as_bytes(), &LIMITS, &Never).unwrap_err();
+    let pointers: Vec<_> = refused.errors.iter().map(|error| error.pointer.as_str()).collect();
+    assert_eq!(pointers, ["/drive/teeth/radius_mm"]);
+}

@@ -1,7 +1,7 @@
 //! The contact law. A law is a structure of its fields, a line of the union and an arm of each match.
 
 use serde::{Deserialize, Serialize};
-use toothwave_solver::{ContactLaw, PerContact};
+use toothwave_solver::{ContactLaw, Parameter, PerContact};
 use utoipa::ToSchema;
 
 use super::drive::LengthsByContactDocument;
@@ -78,9 +78,11 @@ impl From<&StiffnessDocument> for ContactLaw {
 }
 
 impl StiffnessDocument {
-    /// Writes out the numbers that are left out.
+    /// Writes out the numbers that are left out. An impossible radius has its own error, so that it is not copied.
     pub(super) fn fill_in(&mut self, tooth_radius_mm: f64) {
-        if let Self::Johnson(JohnsonDocument { depth_mm }) = self {
+        if let Self::Johnson(JohnsonDocument { depth_mm }) = self
+            && Parameter::ToothRadius.check(tooth_radius_mm).is_none()
+        {
             for depth_mm in [&mut depth_mm.wave_generator, &mut depth_mm.ring, &mut depth_mm.carrier] {
                 depth_mm.get_or_insert(tooth_radius_mm);
             }
