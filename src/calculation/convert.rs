@@ -12,21 +12,22 @@ use crate::no_answer::NoAnswer;
 const SWITCHES: [DeprecatedField; 3] =
     [DeprecatedField::RingTeethBend, DeprecatedField::WaveGeneratorMoves, DeprecatedField::CornerContact];
 
-/// Names of the lists of pointers into the design, in a study document.
-const LISTS_OF_POINTERS: [&str; 3] = ["over", "free", "inputs"];
-
-/// The document that means the same without deprecated fields, of a design or of a study.
+/// The design document that means the same without deprecated fields.
 ///
 /// # Errors
-/// Fails if the text is no such document or contradicts itself, or if a field has no replacement for all variants of a study.
+/// Fails if the text is no design document or contradicts itself.
 pub fn converted(text: &[u8]) -> Result<String, NoAnswer> {
     let mut tree = json::tree(text)?;
-    if tree.at(&place(&["study"])).is_some() {
-        convert_study(&mut tree)?;
-    } else {
-        convert_design(&mut tree)?;
-    }
-    serde_json::to_string_pretty(&Written(&tree)).map_err(NoAnswer::internal)
+    convert_design(&mut tree)?;
+    written(&tree)
+}
+
+/// Returns a document as people write it: indented, whole numbers without a point.
+///
+/// # Errors
+/// A number is not finite.
+pub fn written(tree: &Tree) -> Result<String, NoAnswer> {
+    serde_json::to_string_pretty(&Written(tree)).map_err(NoAnswer::internal)
 }
 
 fn place(names: &[&str]) -> Vec<String> {
@@ -89,47 +90,25 @@ fn remove_if_empty(tree: &mut Tree, name: &str) {
     }
 }
 
-/// Converts the base, the designs to start with, and the pointers to the varied fields.
-fn convert_study(tree: &mut Tree) -> Result<(), NoAnswer> {
-    let Tree::Object(fields) = tree else { return Ok(()) };
-    for (name, value) in fields {
-        match (name.as_str(), value) {
-            ("base", base) => convert_base(base).map_err(|found| found.within(name))?,
-            ("start", Tree::Array(designs)) => designs.iter_mut().for_each(move_clearance),
-            (list, Tree::Object(pointers)) if LISTS_OF_POINTERS.contains(&list) => {
-                for (pointer, _) in pointers {
-                    *pointer = converted_pointer(pointer).map_err(|found| found.within(list))?;
-                }
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
-
-fn convert_base(base: &mut Tree) -> Result<(), Fault> {
-    for switch in SWITCHES {
-        if json::path(switch.pointer()).is_some_and(|path| base.at(&path).is_some()) {
-            return Err(no_replacement(switch));
-        }
-    }
-    let teeth_um = number(base, &["parts", "teeth", "clearance_um"]);
-    for contact in Contact::all().map(contact_name) {
-        let gap_um = number(base, &["model", "clearance", &format!("{contact}_um")]);
-        let of_parts = number(base, &["parts", contact, "clearance_um"]) + teeth_um;
-        if gap_um != 0.0 && of_parts != 0.0 && gap_um.total_cmp(&of_parts).is_ne() {
-            let pointer = format!("/model/clearance/{contact}_um");
-            let detail =
-                format!("the gap is {gap_um:?} µm here, and {of_parts:?} µm by `parts`; leave out one of them");
-            return Err(Fault { pointer, code: FieldCode::ConflictingFields, detail });
-        }
+/// Moves the gaps of `model.clearance` in the base of a study that does not contradict itself.
+///
+/// # Errors
+/// The base has a switch of refinements. They depend on the geometry, which may vary.
+pub fn convert_base(base: &mut Tree) -> Result<(), Fault> {
+    let is_in = |pointer: &str| json::path(pointer).is_some_and(|path| base.at(&path).is_some());
+    if let Some(&switch) = SWITCHES.iter().find(|switch| is_in(switch.pointer())) {
+        return Err(no_replacement(switch));
     }
     move_clearance(base);
     remove_if_empty(base, "model");
     Ok(())
 }
 
-fn converted_pointer(pointer: &str) -> Result<String, Fault> {
+/// Returns the pointer of the field that replaces a deprecated one, or the pointer itself.
+///
+/// # Errors
+/// The field is a switch of refinements.
+pub fn converted_pointer(pointer: &str) -> Result<String, Fault> {
     if let Some(&switch) = SWITCHES.iter().find(|switch| switch.pointer() == pointer) {
         return Err(no_replacement(switch));
     }
@@ -142,7 +121,6 @@ fn no_replacement(switch: DeprecatedField) -> Fault {
     Fault { pointer: switch.pointer().into(), code: FieldCode::ConflictingFields, detail: detail.into() }
 }
 
-/// A tree as people write it: whole numbers without a point.
 struct Written<'a>(&'a Tree);
 
 impl Serialize for Written<'_> {

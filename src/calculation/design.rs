@@ -11,7 +11,9 @@ use toothwave_solver::parts::{CarrierRadii, PartsParameters};
 use toothwave_solver::profile::ProfileParameters;
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::{OfDutyPoint, SHARES_TOLERANCE};
-use toothwave_solver::{DriveParameters, LoadParameters, Materials, Modification, Parameter, Torque, Violation};
+use toothwave_solver::{
+    DriveParameters, LoadCase, LoadParameters, Materials, Modification, Parameter, Torque, Violation,
+};
 use utoipa::ToSchema;
 
 use crate::field::FieldCode;
@@ -155,6 +157,9 @@ impl Design {
         if let Some(friction) = &mut self.friction {
             friction.leave_out_zero_wear();
         }
+        if let Some(load) = &mut self.load {
+            load.allowable_stress_mpa = load.allowable_stress_mpa.map(AllowableStressDocument::normalised);
+        }
         self
     }
 
@@ -208,11 +213,18 @@ impl Design {
             Fault::of_field(FieldCode::MissingField, "load", detail.into())
         })?;
         let Duty { points, hardest, .. } = self.duty_of(load)?;
-        let torque = points[hardest].torque;
-        let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.refinements(has_pointed_tips);
         Ok(LoadParameters {
+            torque: points[hardest].torque,
+            allowable_stress_mpa: load.allowable_stress_mpa.map(Into::into),
+            ..self.model_parameters(has_pointed_tips)
+        })
+    }
+
+    /// Returns the parameters of the load with the default torque.
+    fn model_parameters(&self, has_pointed_tips: bool) -> LoadParameters {
+        let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.refinements(has_pointed_tips);
+        LoadParameters {
             materials: self.materials,
-            torque,
             compatibility: self.model.compatibility,
             law: (&self.stiffness()).into(),
             series_compliance_mm_per_n: self.model.series_compliance_mm_per_n.given().unwrap_or_default(),
@@ -222,8 +234,14 @@ impl Design {
             modification: self.modification,
             carrier: self.carrier_of_flats(),
             clearance_um: self.clearances_um().gaps(),
-            allowable_stress_mpa: load.allowable_stress_mpa.map(Into::into),
-        })
+            ..LoadParameters::default()
+        }
+    }
+
+    /// Returns what the document gives and its `projection` rejects.
+    pub fn projection_violations(&self) -> Vec<Violation> {
+        let found = LoadCase::new(&self.model_parameters(false)).err().into_iter().flatten();
+        found.filter(|violation| matches!(violation, Violation::NeedsVirtualWork { .. })).collect()
     }
 
     /// Returns the given radii of the carrier that supports flat-sided teeth. Forces on other teeth do not depend on

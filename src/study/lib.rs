@@ -7,6 +7,7 @@
 
 mod answer;
 mod ask;
+mod convert;
 mod document;
 mod evaluate;
 mod front;
@@ -30,6 +31,7 @@ mod tolerance;
 mod variant;
 
 pub use answer::StudyAnswer;
+pub use convert::converted;
 pub use document::*;
 pub use evaluate::{Reason, Stopped};
 pub use gathered::Gathered;

@@ -34,6 +34,8 @@ const OWN_BYTES: usize = 1 << 18;
 
 const RING_TEETH: [&str; 3] = ["drive", "ring", "teeth"];
 
+const LAW: [&str; 3] = ["model", "stiffness", "law"];
+
 /// Documents with free fields, one for each combination of choices. Clones share those that they have not filled.
 #[derive(Debug, Clone)]
 pub(crate) struct Template {
@@ -326,6 +328,10 @@ impl Template {
                 Domain::Real { min, .. } | Domain::Whole { min, .. } => Tree::Number(min.ceil()),
             };
             form.tree.set(&variable.path, value);
+        }
+        form.derive();
+        if base.at(&LAW.map(String::from)[..2]).is_none() {
+            form.name_law_of_numbers();
         }
         let mut left_out = 0;
         loop {

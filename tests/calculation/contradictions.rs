@@ -240,19 +240,6 @@ fn document_without_deprecated_fields_stays_unchanged() {
 }
 
 #[test]
-fn study_is_converted_with_its_pointers() {
-    let old = json!({
-        "study": "map", "base": with(&json!({ "model": { "clearance": { "carrier_um": 2.0 } } })),
-        "over": { "/model/clearance/ring_um": { "min": 0.0, "max": 10.0, "steps": 3 } }
-    });
-    let new = json!({
-        "study": "map", "base": with(&json!({ "parts": { "carrier": { "clearance_um": 2.0 } } })),
-        "over": { "/parts/ring/clearance_um": { "min": 0.0, "max": 10.0, "steps": 3 } }
-    });
-    assert_eq!(convert(&old), plain(&new));
-}
-
-#[test]
 fn impossible_tooth_radius_is_one_error() {
     let mut document = case_5_2();
     document["drive"]["teeth"]["radius_mm"] = json!(-5.0);

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use toothwave_calculation::accuracy::Accuracy;
+use toothwave_calculation::accuracy::{Accuracy, AccuracyAnswer};
 use toothwave_calculation::design::Design;
 use toothwave_calculation::forms::Format;
 use toothwave_calculation::key::Key;
@@ -151,6 +151,33 @@ fn returned_model_gives_same_answer() {
         };
         assert_eq!(key(&sent_back), key(&document), "{sent_back}");
     }
+}
+
+/// Its methods include those of virtual work, whose refinements `projection` itself has not.
+#[test]
+fn returned_model_of_projection_gives_same_methods() {
+    let mut document = pointed();
+    document["model"] = json!({ "compatibility": "projection" });
+    let answer = |document: &Value| Accuracy.ask(document.to_string().as_bytes(), &LIMITS, &Never).unwrap();
+    let first = answer(&document);
+    document["model"] = serde_json::to_value(&first.model).unwrap();
+    let again = answer(&document);
+    let differences = |answer: AccuracyAnswer| -> Vec<_> {
+        answer.ways.iter().map(|way| (way.law, way.states, way.model_difference.to_bits())).collect()
+    };
+    assert_eq!(differences(again), differences(first));
+}
+
+#[test]
+fn three_equal_stresses_are_one() {
+    let keyed = |stress: Value| {
+        let mut document = pointed();
+        put(&mut document, "/load/allowable_stress_mpa", stress);
+        Sweep.key(&read(&document).unwrap(), &Format::Json)
+    };
+    let each = |ring: f64| json!({ "wave_generator": 900.0, "ring": ring, "carrier": 900.0 });
+    assert_eq!(keyed(each(900.0)), keyed(json!(900.0)));
+    assert_ne!(keyed(each(800.0)), keyed(json!(900.0)));
 }
 
 #[test]

@@ -25,7 +25,9 @@ fn conflict_is_refused_for_quantities_without_load_too() {
     let point = json!({ "input_torque_nm": 20.0, "input_speed_rpm": 100.0, "share_of_time": 1.0 });
     let of_duty = with(&paper(), "/load", json!({ "duty": [point] }));
     let of_samples = with(&paper(), "/sweep", json!({ "samples": 50 }));
+    let of_johnson = with(&paper(), "/model/stiffness", json!({ "law": "johnson" }));
     for (base, pointer, at) in [
+        (of_johnson, "/parts/ring/clearance_um", "/base/model/stiffness/law"),
         (paper(), "/load/output_torque_nm", "/base/load"),
         (of_samples, "/sweep/tolerance", "/base/sweep"),
         (of_duty.clone(), "/load/input_torque_nm", "/base/load"),

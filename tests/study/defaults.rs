@@ -68,6 +68,25 @@ fn explicit_default_keeps_the_id() {
     }
 }
 
+/// The numbers of the default law, too, vary without the law's name.
+#[test]
+fn left_out_law_has_its_numbers() {
+    let mut short = paper();
+    short.as_object_mut().unwrap().remove("model");
+    let long = with(&short, "/model", json!({ "stiffness": { "law": "johnson" } }));
+    let depth = "/model/stiffness/depth_mm/ring";
+    let of = |base: &Value| {
+        [
+            json!({ "study": "map", "base": base, "over": { depth: { "min": 4, "max": 6, "steps": 3 } } }),
+            json!({ "study": "search", "base": base, "free": { depth: { "min": 4, "max": 6 } }, "objectives": [{ "quantity": "peak_force_n", "goal": "min" }] }),
+            json!({ "study": "sensitivity", "base": base, "inputs": { depth: {} } }),
+        ]
+    };
+    for (short, long) in of(&short).iter().zip(&of(&long)) {
+        assert_same_id(short, long);
+    }
+}
+
 #[test]
 fn inputs_written_out_keep_the_id() {
     for base in examples() {

@@ -7,6 +7,7 @@
 
 mod asking;
 mod conflicts;
+mod conversion;
 mod defaults;
 mod deviations;
 mod engine;

@@ -82,6 +82,15 @@ pub struct StressByContactDocument {
     pub carrier: f64,
 }
 
+impl AllowableStressDocument {
+    /// Returns one number for three equal ones.
+    pub(super) fn normalised(self) -> Self {
+        let PerContact { wave_generator, ring, carrier } = self.into();
+        let is_one = [ring, carrier].iter().all(|stress_mpa| stress_mpa.total_cmp(&wave_generator).is_eq());
+        if is_one { Self::Everywhere(ring) } else { self }
+    }
+}
+
 impl Serialize for AllowableStressDocument {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {

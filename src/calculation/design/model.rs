@@ -20,7 +20,8 @@ pub struct ModelDocument {
     /// Compatibility: relation of the approaches at a tooth's contacts. Default: `virtual_work`.
     #[serde(default)]
     pub compatibility: Compatibility,
-    /// The contact law; left out, `hertz` of balls, of other teeth `johnson`, and `linear` with `projection`.
+    /// The contact law; the object names its `law`. Without the object: `hertz` for balls, `linear` for other teeth with
+    /// `projection`, otherwise `johnson`.
     #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub stiffness: Option<StiffnessDocument>,

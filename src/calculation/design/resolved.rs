@@ -211,15 +211,14 @@ impl Design {
         }
     }
 
-    /// Returns the requested refinements, for a drive with or without pointed or bored tips. A list with `projection`
+    /// Returns the refinements of the model, for a drive with or without pointed or bored tips. A list with `projection`
     /// is rejected elsewhere.
-    fn refinements_of(
-        &self,
-        asked: RefinementsDocument,
-        compatibility: Compatibility,
-        has_pointed_tips: bool,
-    ) -> Refinements {
-        let by_geometry = match compatibility {
+    pub fn refinements(&self, has_pointed_tips: bool) -> Refinements {
+        self.refinements_of(self.model.refinements, has_pointed_tips)
+    }
+
+    fn refinements_of(&self, asked: RefinementsDocument, has_pointed_tips: bool) -> Refinements {
+        let by_geometry = match self.model.compatibility {
             Compatibility::VirtualWork if asked.auto => self.refinements_by_geometry(has_pointed_tips),
             _ => Refinements::NONE,
         };
@@ -234,14 +233,13 @@ impl Design {
         }
     }
 
-    /// Returns the refinements of the model.
-    pub fn refinements(&self, has_pointed_tips: bool) -> Refinements {
-        self.refinements_of(self.model.refinements, self.model.compatibility, has_pointed_tips)
-    }
-
-    /// Returns the refinements under virtual work, whatever the document's compatibility.
+    /// Returns the refinements under virtual work, whatever the document's compatibility. A document with `projection`
+    /// chooses none for its own model only.
     pub fn refinements_by_virtual_work(&self, has_pointed_tips: bool) -> Refinements {
-        self.refinements_of(self.model.refinements, Compatibility::VirtualWork, has_pointed_tips)
+        match self.model.compatibility {
+            Compatibility::VirtualWork => self.refinements(has_pointed_tips),
+            Compatibility::Projection => self.refinements_by_geometry(has_pointed_tips),
+        }
     }
 
     /// Returns the default contact law: the most accurate one, or the paper's law with the paper's compatibility.
@@ -315,7 +313,7 @@ impl Design {
         if model.refinements != RefinementsDocument::AUTO && !has_switch {
             let drive = Draft::new(&self.drive_parameters()).ok().and_then(|draft| draft.drive());
             let has_pointed_tips = drive.is_some_and(|drive| model_error::has_pointed_tips(&drive));
-            let of = |asked| self.refinements_of(asked, model.compatibility, has_pointed_tips);
+            let of = |asked| self.refinements_of(asked, has_pointed_tips);
             let refinements = of(model.refinements);
             let is_auto = refinements == of(RefinementsDocument::AUTO);
             model.refinements =

@@ -15,13 +15,13 @@ use clap::{Args, Parser, Subcommand};
 use tokio::runtime::Builder;
 use toothwave_calculation::accuracy::Accuracy;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
-use toothwave_calculation::convert::converted;
 use toothwave_calculation::drawing::Drawing;
 use toothwave_calculation::drawing::answer::DrawnPart;
 use toothwave_calculation::drawing::preset::Preset;
 use toothwave_calculation::forms::Format;
 use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::sweep::Sweep;
+use toothwave_study::converted;
 
 use crate::http::endpoints::batch::{BatchEndpoint, BatchQuery};
 use crate::http::observe::note_problem;

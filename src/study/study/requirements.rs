@@ -123,6 +123,10 @@ pub(super) fn check(
     if let Some(conflict) = design.conflict() {
         return Err(conflict.into());
     }
+    let rejected = design.projection_violations();
+    if !rejected.is_empty() {
+        return Err(NoAnswer::impossible(&rejected));
+    }
     if quantities.iter().all(|quantity| quantity.needs == Needs::Drive) {
         CoincidenceDegree.check(&design, limits).map(|_| ())
     } else {
@@ -237,6 +241,8 @@ fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
             Some(Tree::Array(_)) => !template.varies_within(&[&error.pointer]),
             _ => false,
         },
+        // `projection` rejects parts of the model whatever the drive.
+        FieldCode::ConflictingFields if error.pointer.starts_with("/model/") => !template.varies_within(&["/model"]),
         FieldCode::ConflictingFields => !template.varies_within(&[
             "/drive",
             "/load",

@@ -6,8 +6,9 @@ use toothwave_calculation::design::Design;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::json::Tree;
 
-use super::RING_TEETH;
 use super::variable::{Domain, Variable};
+use super::{LAW, RING_TEETH};
+use crate::identity::complete;
 
 #[derive(Debug, Clone)]
 pub(super) struct Form {
@@ -44,6 +45,19 @@ impl Form {
         };
         if let (Some(lobes), Some(count)) = (lobes, number(&["drive", "teeth", "count"])) {
             self.tree.set(&RING_TEETH.map(String::from), Tree::Number(count - lobes));
+        }
+    }
+
+    /// Names the default law, if free fields are its numbers and nothing names the law.
+    pub(super) fn name_law_of_numbers(&mut self) {
+        let law = LAW.map(String::from);
+        if self.tree.at(&law[..2]).is_none() || self.tree.at(&law).is_some() {
+            return;
+        }
+        let mut without = self.tree.clone();
+        without.remove(&law[..2]);
+        if let Some(name) = complete(&without).ok().and_then(|complete| complete.at(&law).cloned()) {
+            self.tree.set(&law, name);
         }
     }
 
