@@ -225,7 +225,6 @@ const PAGE = {
     measuring: 'Measuring…',
     stale: 'Measured for another design; measure again for this one.',
     model: '{compatibility}, {law}',
-    law: { linear: 'linear', fixed: 'fixed', palmgren: 'Palmgren', johnson: 'Johnson', hertz: 'Hertz' },
     own: 'this design’s own',
     differs: 'peaks differ by {percent} % from this design’s',
     unavailable: 'no answer for this design ({reason})',

@@ -214,7 +214,6 @@ const PAGE = {
     measuring: '正在测定…',
     stale: '测定的是另一个设计；请对本设计重新测定。',
     model: '{compatibility}，{law}',
-    law: { linear: '线性', fixed: '给定刚度', palmgren: 'Palmgren', johnson: 'Johnson', hertz: '赫兹' },
     own: '本设计所用',
     differs: '峰值与本设计相差 {percent} %',
     unavailable: '对本设计无解（{reason}）',
