@@ -540,8 +540,8 @@ test('accuracy rows of fixed law restore measured stiffnesses', async () => {
   await enter(page, '/model/stiffness/ring_n_per_mm', 250000);
   const original = await designOf(page);
   await measure();
-  const own = page.locator('#accuracy-list details', { hasText: /^Projection, Fixed/ });
-  assert.equal(await own.locator('summary').textContent(), 'Projection, Fixed this design’s own');
+  const own = page.locator('#accuracy-list details', { hasText: /^Projection, Fixed stiffnesses/ });
+  assert.equal(await own.locator('summary').textContent(), 'Projection, Fixed stiffnesses this design’s own');
   const errors = await own.locator('tbody td:nth-child(2) data').evaluateAll((cells) => cells.map(({ value }) => Number(value)));
   const { ways } = await server.ask('/v1/accuracy', original);
   assert.deepEqual(errors, ways.filter(({ compatibility, law }) => compatibility === 'projection' && law === 'fixed').map(({ error }) => error));
@@ -551,11 +551,11 @@ test('accuracy rows of fixed law restore measured stiffnesses', async () => {
     return designOf(page);
   };
   assert.deepEqual((await use('50 samples: use with Virtual work, Palmgren')).model, { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } });
-  assert.deepEqual((await use('50 samples: use with Virtual work, Fixed')).model, { ...original.model, compatibility: 'virtual_work' });
+  assert.deepEqual((await use('50 samples: use with Virtual work, Fixed stiffnesses')).model, { ...original.model, compatibility: 'virtual_work' });
   // Other stiffnesses are another question, for which the rows do not hold.
   await enter(page, '/model/stiffness/ring_n_per_mm', 400000);
   assert.match(await page.textContent('#accuracy-state'), /another design; measure again/);
-  const back = await use('100 samples: use with Projection, Fixed');
+  const back = await use('100 samples: use with Projection, Fixed stiffnesses');
   assert.deepEqual(back, { ...original, model: { ...original.model, compatibility: 'projection' }, sweep: { samples: 100 } });
   await assertShows(back);
 });
