@@ -68,6 +68,33 @@ fn explicit_default_keeps_the_id() {
     }
 }
 
+/// Where the drive varies, `auto` may mean something else in each variant.
+#[test]
+fn returned_model_keeps_the_id_for_one_drive() {
+    let [base, ..] = examples();
+    let base = with(&base, "/model", json!({}));
+    let swept = Sweep.ask(base.to_string().as_bytes(), &CALCULATION, &Never).unwrap();
+    let returned = with(&base, "/model", serde_json::to_value(&swept.model).unwrap());
+    let over = |base: &Value, pointer: &str, max: f64| json!({ "study": "map", "base": base, "over": { pointer: { "min": 1.0, "max": max, "steps": 2 } } });
+    let torque = "/load/input_torque_nm";
+    assert_same_id(&over(&base, torque, 2.0), &over(&returned, torque, 2.0));
+    let [short, long] = [&base, &returned].map(|base| study(&over(base, "/parts/ring/clearance_um", 9.0)).unwrap());
+    assert_ne!(short.id(), long.id());
+}
+
+#[test]
+fn strength_by_name_is_its_numbers() {
+    let [base, ..] = examples();
+    let of = |strength: Value| {
+        let base = with(&base, "/parts", json!({ "carrier": { "strength": strength } }));
+        json!({ "study": "map", "base": base, "over": { "/load/input_torque_nm": { "min": 1, "max": 2, "steps": 2 } } })
+    };
+    let numbers = json!({
+        "yield_strength_mpa": 490, "tensile_strength_mpa": 700, "endurance_limit_mpa": 315, "hardened": false
+    });
+    assert_same_id(&of(json!("c45-qt")), &of(numbers));
+}
+
 /// The numbers of the default law, too, vary without the law's name.
 #[test]
 fn left_out_law_has_its_numbers() {

@@ -7,7 +7,7 @@ use toothwave_solver::{Compatibility, Deviations, Parameter, Part, PerContact, V
 
 use super::{
     ClearanceDocument, Design, DriveDocument, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
-    Refinements, RefinementsDocument, StiffnessDocument, TeethDocument,
+    Refinements, RefinementsDocument, StiffnessDocument, StrengthDocument, TeethDocument,
 };
 use crate::field::{FieldCode, contact_name, pointer};
 use crate::json::Fault;
@@ -280,6 +280,17 @@ impl Design {
         self.model.stiffness = Some(self.stiffness());
         self.model.clearance = self.clearance_in_key().cloned();
         self.drive.teeth.install_all_by_default();
+        self
+    }
+
+    /// Returns the document in one of several spellings with the same meaning: strengths as numbers and, if the drive is
+    /// that of every variant, `auto` for the refinements that it means.
+    pub fn in_one_spelling(mut self, is_only_drive: bool) -> Self {
+        self.parts.carrier.strength =
+            self.parts.carrier.strength.map(|strength| StrengthDocument::Given(strength.numbers()));
+        if is_only_drive {
+            self.model.refinements = self.model_in_key().refinements;
+        }
         self
     }
 
