@@ -12,6 +12,9 @@ use super::{
 use crate::field::{FieldCode, contact_name, pointer};
 use crate::json::Fault;
 
+/// Relative difference of a gap and a sum of clearances that is due to rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// Clearance of each part: offset of its working surface.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ClearancesUm {
@@ -150,7 +153,8 @@ impl Design {
         let of_parts = self.clearances_of_parts_um().gaps();
         for (contact, &gap_um) in self.deprecated_gaps_um().iter() {
             let of_parts = *of_parts.get(contact);
-            if gap_um != 0.0 && of_parts != 0.0 && gap_um.total_cmp(&of_parts).is_ne() {
+            let differs = (gap_um - of_parts).abs() > ROUNDING * gap_um.abs();
+            if gap_um != 0.0 && of_parts != 0.0 && differs {
                 let detail = format!(
                     "the gap is {gap_um:?} µm here, and {of_parts:?} µm by `parts.{}.clearance_um` and `parts.teeth.clearance_um`; leave out `model.clearance`, which is deprecated",
                     contact_name(contact)

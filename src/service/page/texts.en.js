@@ -69,6 +69,7 @@ const PAGE = {
     apply: 'Apply',
     copy: 'Copy',
     no_json: 'This is not JSON: {fault}',
+    given_twice: 'The field “{field}” is given twice. Remove one.',
     no_object: 'A design document is a JSON object; this is another value.',
   },
   login: {

@@ -68,6 +68,7 @@ const PAGE = {
     apply: '应用',
     copy: '复制',
     no_json: '这不是 JSON：{fault}',
+    given_twice: '字段“{field}”出现两次，请删去一个。',
     no_object: '设计文档应为 JSON 对象，这里是其他值。',
   },
   login: {
