@@ -9,7 +9,7 @@ BY_DEFAULT = "default"  # a choice that the document leaves to the service
 FLAGS = {"yes": True, "no": False}
 SWITCHES = ("ring_teeth_bend", "wave_generator_moves", "corner_contact")  # deprecated, of the model
 LOBES = {"ellipse": 2, "eccentric": 1}  # of other kinds they are a field
-PROJECTED = ("linear", "palmgren", "fixed")  # the laws that `projection` takes
+UNPROJECTED = ("johnson", "hertz")  # the laws that `projection` does not take
 
 # Of the service's API document.
 LENGTH_MM = (1e-6, 1e6)
@@ -132,7 +132,7 @@ def _model():
     group, free = "Model", "left to the service"
     ways = (BY_DEFAULT, "projection", "virtual_work")
     yield Field("/model/compatibility", "Compatibility", "Approaches add up by", group, BY_DEFAULT, blank=free, choices=ways)
-    law, laws = "StiffnessLaw", (BY_DEFAULT, *PROJECTED, "johnson", "hertz")
+    law, laws = "StiffnessLaw", (BY_DEFAULT, "linear", "palmgren", "fixed", *UNPROJECTED)
     yield Field("/model/stiffness/law", law, "Contact law", group, BY_DEFAULT, blank=free, choices=laws)
     for contact, label in CONTACTS:
         pointer, name = f"/model/stiffness/{contact}_n_per_mm", f"{_named(label)}StiffnessNPerMm"
@@ -392,6 +392,6 @@ def suited(values, chosen):
     is_ball, law, way = values["ToothShape"] == "ball", values["StiffnessLaw"], values["Compatibility"]
     if law not in (BY_DEFAULT, "fixed") and is_ball != (law == "hertz"):
         law = BY_DEFAULT
-    if way == "projection" and not (law == "fixed" or law in (BY_DEFAULT, *PROJECTED) and not is_ball):
+    if way == "projection" and (law in UNPROJECTED or is_ball and law != "fixed"):
         law, way = (BY_DEFAULT, way) if chosen == "Compatibility" and not is_ball else (law, "virtual_work")
     return {"StiffnessLaw": law, "Compatibility": way}

@@ -38,7 +38,14 @@ pub(crate) fn id(
         }
     };
     let designs = template.examples_at(end(true)).chain(template.examples_at(end(false)));
-    let mut parts = designs.map(|design| hash_of(&complete(&design)?)).collect::<Result<Vec<_>, _>>()?;
+    let draws_deviations = matches!(document, StudyDocument::Tolerance(study) if !study.deviations.is_empty());
+    let is_only_drive =
+        !draws_deviations && !template.varies_within(&["/drive", "/parts", "/modification", "/deviations", "/model"]);
+    let in_one_spelling = |design: Tree| match design.read::<Design>() {
+        Ok(read) => tree_of(&read.normalised().with_defaults().in_one_spelling(is_only_drive)),
+        Err(_) => Ok(design),
+    };
+    let mut parts = designs.map(|design| hash_of(&in_one_spelling(design)?)).collect::<Result<Vec<_>, _>>()?;
     parts.push(hash_of(&asked)?);
     let within = format!("{} states, {} points", limits.max_states, limits.max_profile_points);
     Ok(Key::new("study", &parts.join(" ").as_str(), &within.as_str()))

@@ -174,6 +174,10 @@ impl Axis {
                 let detail = format!("the range has one value, {min:?}, but `steps` is {steps:?}. Use 1");
                 return Err(beyond(&format!("{at}/steps"), FieldCode::OutOfRange, detail, steps, 1.0));
             }
+            (Domain::Real { min, max } | Domain::Whole { min, max }, Some(1.0)) if min < max => {
+                let detail = "the range has two ends, but `steps` is 1. Use 2 or more";
+                return Err(beyond(&format!("{at}/steps"), FieldCode::OutOfRange, detail, 1.0, 2.0));
+            }
             (Domain::Whole { min, max }, Some(steps)) => {
                 // A whole quotient of whole numbers below 2^53 is exact.
                 let by = (max - min) / (steps - 1.0).max(1.0);

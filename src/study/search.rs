@@ -4,7 +4,7 @@ mod answer;
 mod envelope;
 mod island;
 
-use envelope::{from_envelope, place_of, put_in};
+use envelope::{from_envelope, place_of, put_in, with_wave_generator};
 use island::variable_values;
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::json::{Tree, path};
@@ -86,7 +86,10 @@ impl SearchDocument {
         let is_ball = at("/drive/teeth/shape") == Some(&Tree::Text("ball".into()));
         if at("/parts/carrier/strength").is_some() && !is_ball {
             let limit = RangeDocument { min: Some(FINGER_SAFETY), max: None };
-            document.require.entry("finger_safety".into()).or_insert(RequireDocument::Range(limit));
+            let limit = document.require.entry("finger_safety".into()).or_insert(RequireDocument::Range(limit));
+            if let RequireDocument::Range(RangeDocument { min, .. }) = limit {
+                min.get_or_insert(FINGER_SAFETY);
+            }
         }
         document
     }
@@ -103,6 +106,9 @@ impl Search {
         let mut free = document.free.clone();
         if free.is_empty() {
             from_envelope(document, &mut base, &mut free)?;
+        } else if free.contains_key("/drive/wave_generator/mean_path_radius_mm") && !free.contains_key(KIND) {
+            // The fields that would be derived, written out.
+            with_wave_generator(&mut base)?;
         }
         let mut list = Vec::new();
         for (pointer, FreeDocument { min, max, one_of }) in &free {

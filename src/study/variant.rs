@@ -74,8 +74,7 @@ impl Template {
             free.iter().flat_map(|one| above(one).into_iter().map(|end| &one.0[..end])).collect();
         let mut variables = Vec::new();
         for ((pointer, asked), path) in free.iter().zip(paths) {
-            let has_fields = matches!(base.at(&path), Some(Tree::Object(_) | Tree::Array(_)));
-            if has_fields || all_above.contains(&**pointer) {
+            if all_above.contains(&**pointer) {
                 let detail = format!("`{pointer}` is an object or a list. Name one of its fields");
                 return Err(fault(&at(pointer), FieldCode::WrongType, detail));
             }

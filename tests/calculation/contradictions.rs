@@ -234,6 +234,14 @@ fn converted_document_gives_same_forces_undeprecated() {
 }
 
 #[test]
+fn gaps_that_differ_by_rounding_are_equal() {
+    let parts = |ring: f64| json!({ "ring": { "clearance_um": ring }, "teeth": { "clearance_um": 0.1 } });
+    let both = |ring: f64| json!({ "model": { "clearance": { "ring_um": 0.8 } }, "parts": parts(ring) });
+    assert!(swept(&both(0.7)).is_ok());
+    assert_eq!(swept(&both(0.71)).unwrap_err().errors[0].code, FieldCode::ConflictingFields);
+}
+
+#[test]
 fn document_without_deprecated_fields_stays_unchanged() {
     let document = with(&json!({ "model": { "refinements": "none" }, "parts": { "ring": { "clearance_um": 1.5 } } }));
     assert_eq!(convert(&document), plain(&document));

@@ -200,6 +200,8 @@ fn reports_fault_of_kind_apart_from_its_fields() {
     fault(json!({ "kind": "eccentric", "radius_mm": 30.8 }), "/eccentricity_mm", FieldCode::MissingField);
     fault(json!({ "kind": "eccentric", "semi_major_mm": 30.8 }), "/semi_major_mm", FieldCode::UnknownField);
     fault(json!({ "radius_mm": 30.8 }), "/radius_mm", FieldCode::UnknownField);
+    let refused = read(&with(&short(), "/drive/wave_generator", json!({ "lobes": 2 }))).unwrap_err();
+    assert!(refused.to_string().ends_with("Or add the `kind` that has it"), "{refused}");
     fault(json!({ "kind": "harmonic", "lobes": 2.5 }), "/lobes", FieldCode::WrongType);
     fault(json!("ellipse"), "", FieldCode::WrongType);
     let twice =

@@ -503,12 +503,12 @@ test('accuracy equals the API’s, and a row applies its choice', async () => {
   );
   assert.deepEqual(shown.map(({ error, states }) => [error, states]), answer.ways.map(({ error, states }) => [error, states]));
   assert.ok(shown.every(({ time }) => time > 0));
-  assert.match(shown[0].note, /^Projection, linear this design’s own$/);
+  assert.match(shown[0].note, /^Projection, Linear this design’s own$/);
   const palmgren = answer.ways.findIndex(({ compatibility, law }) => compatibility === 'virtual_work' && law === 'palmgren');
   assert.match(shown[palmgren].note, new RegExp(`^Virtual work, Palmgren peaks differ by ${(100 * answer.ways[palmgren].model_difference).toFixed(2)}`));
   assert.equal(await page.getAttribute('#accuracy-list button:has-text("50 samples")', 'aria-pressed'), 'true');
   // The number of samples does not change the question, but the model does.
-  await page.click('#accuracy-list button[aria-label="200 samples: use with Projection, linear"]');
+  await page.click('#accuracy-list button[aria-label="200 samples: use with Projection, Linear"]');
   await settled(page);
   assert.deepEqual(await designOf(page), { ...original, sweep: { samples: 200 } });
   assert.match(await page.textContent('#accuracy-state'), /^Fastest within/);
@@ -540,8 +540,8 @@ test('accuracy rows of fixed law restore measured stiffnesses', async () => {
   await enter(page, '/model/stiffness/ring_n_per_mm', 250000);
   const original = await designOf(page);
   await measure();
-  const own = page.locator('#accuracy-list details', { hasText: /^Projection, fixed/ });
-  assert.equal(await own.locator('summary').textContent(), 'Projection, fixed this design’s own');
+  const own = page.locator('#accuracy-list details', { hasText: /^Projection, Fixed stiffnesses/ });
+  assert.equal(await own.locator('summary').textContent(), 'Projection, Fixed stiffnesses this design’s own');
   const errors = await own.locator('tbody td:nth-child(2) data').evaluateAll((cells) => cells.map(({ value }) => Number(value)));
   const { ways } = await server.ask('/v1/accuracy', original);
   assert.deepEqual(errors, ways.filter(({ compatibility, law }) => compatibility === 'projection' && law === 'fixed').map(({ error }) => error));
@@ -551,11 +551,11 @@ test('accuracy rows of fixed law restore measured stiffnesses', async () => {
     return designOf(page);
   };
   assert.deepEqual((await use('50 samples: use with Virtual work, Palmgren')).model, { compatibility: 'virtual_work', stiffness: { law: 'palmgren' } });
-  assert.deepEqual((await use('50 samples: use with Virtual work, fixed')).model, { ...original.model, compatibility: 'virtual_work' });
+  assert.deepEqual((await use('50 samples: use with Virtual work, Fixed stiffnesses')).model, { ...original.model, compatibility: 'virtual_work' });
   // Other stiffnesses are another question, for which the rows do not hold.
   await enter(page, '/model/stiffness/ring_n_per_mm', 400000);
   assert.match(await page.textContent('#accuracy-state'), /another design; measure again/);
-  const back = await use('100 samples: use with Projection, fixed');
+  const back = await use('100 samples: use with Projection, Fixed stiffnesses');
   assert.deepEqual(back, { ...original, model: { ...original.model, compatibility: 'projection' }, sweep: { samples: 100 } });
   await assertShows(back);
 });

@@ -368,6 +368,8 @@ fn map_without_possible_variant_is_refused_beforehand() {
     }
     // A single value is allowed, and teeth may touch at some radii of a map.
     assert_eq!(numbers(&answer(&radius(json!({ "min": 4.0, "max": 4.0, "steps": 1 })))["possible"]["variant"]), [0.0]);
+    let one_of_two_ends = radius(json!({ "min": 4.0, "max": 5.0, "steps": 1 }));
+    assert_eq!(faulty(&one_of_two_ends), ("/over/~1drive~1teeth~1radius_mm/steps".into(), "out_of_range".into()));
     let some = answer(&with(&steps(), "/base/drive/teeth/radius_mm", json!(9.0)));
     assert_eq!(numbers(&some["possible"]["variant"]).len(), 5);
 }

@@ -634,6 +634,8 @@ fn strength_of_carrier_limits_safety_of_fingers() {
     // The default written out is the same study; another limit is not.
     assert_eq!(id(&search), id(&limit(1.5)));
     assert_ne!(id(&search), id(&limit(0.0)));
+    let at_most = |limit: Value| with(&search, "/require", json!({ "finger_safety": limit }));
+    assert_eq!(id(&at_most(json!({ "max": 9 }))), id(&at_most(json!({ "min": 1.5, "max": 9 }))));
     let safety = number(&answer(&search)["front"][0]["quantities"]["finger_safety"]);
     assert!(safety >= 1.5, "{safety}");
     // Balls have no fingers, so they are no answer.

@@ -7,10 +7,13 @@ use toothwave_solver::{Compatibility, Deviations, Modification, Parameter, Part,
 
 use super::{
     ClearanceDocument, Design, DriveDocument, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
-    Refinements, RefinementsDocument, StiffnessDocument, TeethDocument,
+    Refinements, RefinementsDocument, StiffnessDocument, StrengthDocument, TeethDocument,
 };
 use crate::field::{FieldCode, contact_name, pointer};
 use crate::json::Fault;
+
+/// Relative difference of a gap and a sum of clearances that is due to rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// Clearance of each part: offset of its working surface.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -98,7 +101,8 @@ impl Design {
         let of_parts = self.clearances_of_parts_um().gaps();
         for (contact, &gap_um) in self.deprecated_gaps_um().iter() {
             let of_parts = *of_parts.get(contact);
-            if gap_um != 0.0 && of_parts != 0.0 && gap_um.total_cmp(&of_parts).is_ne() {
+            let differs = (gap_um - of_parts).abs() > ROUNDING * gap_um.abs();
+            if gap_um != 0.0 && of_parts != 0.0 && differs {
                 let detail = format!(
                     "the gap is {gap_um:?} µm here, and {of_parts:?} µm by `parts.{}.clearance_um` and `parts.teeth.clearance_um`; leave out `model.clearance`, which is deprecated",
                     contact_name(contact)
@@ -224,6 +228,17 @@ impl Design {
         self.model.stiffness = Some(self.stiffness());
         self.model.clearance = self.clearance_in_key().cloned();
         self.drive.teeth.install_all_by_default();
+        self
+    }
+
+    /// Returns the document in one of several spellings with the same meaning: strengths as numbers and, if the drive is
+    /// that of every variant, `auto` for the refinements that it means.
+    pub fn in_one_spelling(mut self, is_only_drive: bool) -> Self {
+        self.parts.carrier.strength =
+            self.parts.carrier.strength.map(|strength| StrengthDocument::Given(strength.numbers()));
+        if is_only_drive {
+            self.model.refinements = self.model_in_key().refinements;
+        }
         self
     }
 

@@ -2,8 +2,9 @@
 
 use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
 
-use super::fault::Fault;
+use super::fault::{Fault, escaped};
 use super::tree::{ANY, Tree};
+use crate::field::FieldCode;
 
 impl Tree {
     /// Returns what stands here, for a message.
@@ -156,7 +157,15 @@ impl<'de> de::VariantAccess<'de> for Union<'_> {
     type Error = Fault;
 
     fn newtype_variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, Fault> {
-        seed.deserialize(de::value::MapAccessDeserializer::new(Fields::new(self.fields, Some(self.tag))))
+        let is_named = self.fields.iter().any(|(key, _)| key == self.tag);
+        let fields = Fields::new(self.fields, Some(self.tag));
+        seed.deserialize(de::value::MapAccessDeserializer::new(fields)).map_err(|mut fault| {
+            let is_own = self.fields.iter().any(|(key, _)| fault.pointer == format!("/{}", escaped(key)));
+            if fault.code == FieldCode::UnknownField && is_own && !is_named {
+                fault.detail = format!("{}. Or add the `{}` that has it", fault.detail, self.tag);
+            }
+            fault
+        })
     }
 
     fn unit_variant(self) -> Result<(), Fault> {

@@ -30,10 +30,10 @@ export const group = (pointer) => ({ title: t(`group.${pointer}`), hint: textOf(
 /** A field's label where it stands without its group. */
 export const fullLabel = ({ label: own, of }) => (of ? t('name.of', { label: own, of: of.toLowerCase() }) : own);
 
-const PART = /\/(wave_generator|teeth|ring|carrier)(?=_runout|_n_per_mm$|_um$|$|\/[^/]*$)/;
+const PART = /(?<=\/|allowable_)(wave_generator|teeth|ring|carrier)(?=_runout|_n_per_mm$|_um$|_mpa$|$|\/[^/]*$)/;
 
 /** What a field means. */
-export const explanationOf = (pointer) => textOf(`explain.${pointer}`) ?? textOf(`explain.${pointer.replace(PART, '/*')}`);
+export const explanationOf = (pointer) => textOf(`explain.${pointer}`) ?? textOf(`explain.${pointer.replace(PART, '*')}`);
 
 /** Every field that can stand in the form, with the group that holds it. */
 export function fieldsOf({ parts, fields }) {

@@ -475,8 +475,8 @@ async function load() {
   examples.offer();
 }
 
-function offerMaterials({ materials }) {
-  learnMaterials(materials);
+function offerMaterials(served) {
+  learnMaterials(served);
   form.offerMaterials();
   if (lastResult) onResult(lastResult);
 }

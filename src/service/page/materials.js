@@ -7,13 +7,18 @@ import { SERVICE, listed, t } from './texts.js';
 const PARTS = ['wave_generator', 'teeth', 'ring', 'carrier'];
 
 let known = [];
+let strengths = [];
 
-/** Takes the service's materials, `{ name, title, youngs_modulus_gpa, … }`. */
-export function learnMaterials(materials) {
+/** Takes the service's materials, `{ name, title, youngs_modulus_gpa, … }`, and strengths. */
+export function learnMaterials({ materials, strengths: served }) {
+  strengths = served;
   known = materials.map((material) => ({ ...material, title: SERVICE.materials?.[material.name] ?? material.title }));
 }
 
 export const knownMaterials = () => known;
+
+/** The strength of a carrier's material by its name. */
+export const strengthNamed = (name) => strengths.find((strength) => strength.name === name);
 
 /** The materials that have the numbers of a part; steels share theirs. */
 export function materialsOf(design, part) {

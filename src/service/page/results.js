@@ -3,7 +3,7 @@
 import { at, isEstimated, outerRadiusOf } from './design.js';
 import { html, setAttributes, setProperties, setText, symbol } from './dom.js';
 import { DASH, difference, number, withUnit } from './format.js';
-import { unpublished } from './materials.js';
+import { strengthNamed, unpublished } from './materials.js';
 import { CONTACTS } from './motion.js';
 import { term } from './terms.js';
 import { listed, t, textOf } from './texts.js';
@@ -129,7 +129,7 @@ export function heldOf({ design, sweep: { fingers } }) {
 /** Hardened steel cracks at the notch before it yields. */
 function isHardened({ design }) {
   const strength = at(design, '/parts/carrier/strength');
-  return strength === '100cr6' || strength?.hardened === true;
+  return (strengthNamed(strength) ?? strength)?.hardened === true;
 }
 
 const safetyRow = (label, sign, key, more) => row(label, sign, '', ({ sweep }) => sweep?.fingers?.[key], { significant: 3, exceedsLimit: ({ sweep }) => sweep.fingers[key] < 1, ...more });

@@ -10,10 +10,26 @@ function encode(design) {
 
 function decode(text) {
   const binary = atob(text.replaceAll('-', '+').replaceAll('_', '/'));
-  return JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(Uint8Array.from(binary, (c) => c.charCodeAt(0))));
+  return fromText(new TextDecoder('utf-8', { fatal: true }).decode(Uint8Array.from(binary, (c) => c.charCodeAt(0))));
 }
 
 const isObject = (value) => typeof value === 'object' && value !== null && !Array.isArray(value);
+
+/** A field that an object of a JSON text has twice, if any: browsers read the last one alone. */
+function fieldGivenTwice(text) {
+  const objects = [];
+  const tokens = text.match(/"(?:[^"\\]|\\.)*"|[{}:]/g) ?? [];
+  for (const [index, token] of tokens.entries()) {
+    if (token === '{') objects.push(new Set());
+    else if (token === '}') objects.pop();
+    else if (tokens[index + 1] === ':') {
+      const field = JSON.parse(token);
+      if (objects.at(-1).has(field)) return field;
+      objects.at(-1).add(field);
+    }
+  }
+  return undefined;
+}
 
 /** What the address holds: `{ design, reference, view, broken }`, each of the first two undefined where there is none or none that can be
  *  read; `broken` names those. An address that holds something else, as a link that was cut short, is a broken design. */
@@ -24,9 +40,9 @@ export function fromAddress(hash) {
   for (const name of ['design', 'reference']) {
     if (!parameters.has(name)) continue;
     try {
-      const design = decode(parameters.get(name));
-      if (!isObject(design)) throw new Error('no design document');
-      found[name] = design;
+      const [text, ...others] = parameters.getAll(name);
+      if (others.length > 0) throw new Error('several documents');
+      found[name] = decode(text);
     } catch {
       found.broken.push(name);
     }
@@ -50,6 +66,8 @@ export function fromText(text) {
     throw new Error(t('document.no_json', { fault: error.message }));
   }
   if (!isObject(design)) throw new Error(t('document.no_object'));
+  const field = fieldGivenTwice(text);
+  if (field !== undefined) throw new Error(t('document.given_twice', { field }));
   return design;
 }
 

@@ -69,6 +69,7 @@ const PAGE = {
     apply: 'Apply',
     copy: 'Copy',
     no_json: 'This is not JSON: {fault}',
+    given_twice: 'The field “{field}” is given twice. Remove one.',
     no_object: 'A design document is a JSON object; this is another value.',
   },
   login: {
@@ -225,7 +226,6 @@ const PAGE = {
     measuring: 'Measuring…',
     stale: 'Measured for another design; measure again for this one.',
     model: '{compatibility}, {law}',
-    law: { linear: 'linear', fixed: 'fixed', palmgren: 'Palmgren', johnson: 'Johnson', hertz: 'Hertz' },
     own: 'this design’s own',
     differs: 'peaks differ by {percent} % from this design’s',
     unavailable: 'no answer for this design ({reason})',

@@ -68,6 +68,7 @@ const PAGE = {
     apply: '应用',
     copy: '复制',
     no_json: '这不是 JSON：{fault}',
+    given_twice: '字段“{field}”出现两次，请删去一个。',
     no_object: '设计文档应为 JSON 对象，这里是其他值。',
   },
   login: {
@@ -214,7 +215,6 @@ const PAGE = {
     measuring: '正在测定…',
     stale: '测定的是另一个设计；请对本设计重新测定。',
     model: '{compatibility}，{law}',
-    law: { linear: '线性', fixed: '给定刚度', palmgren: 'Palmgren', johnson: 'Johnson', hertz: '赫兹' },
     own: '本设计所用',
     differs: '峰值与本设计相差 {percent} %',
     unavailable: '对本设计无解（{reason}）',

@@ -94,7 +94,7 @@ impl Neighbours {
         match self.locus.cam() {
             Cam::Ellipse(cam) if self.installed > 3 => return self.touching_radius_of_ellipse_mm(cam),
             Cam::HarmonicPath(_) => return Ok(0.5 * center_distance_mm),
-            Cam::Ellipse(_) | Cam::Harmonic(_) => {}
+            _ => {}
         }
         let free_mm = 0.5 * self.surely_free_radius_mm();
         let at = |exponent: f64| Self { locus: Locus::new(*self.locus.cam(), free_mm * exponent.exp()), ..*self };

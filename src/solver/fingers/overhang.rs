@@ -4,7 +4,6 @@
 use std::f64::consts::PI;
 
 use crate::contact::{Contact, Material, PerContact};
-use crate::contact_law::ContactLaw;
 use crate::drive::{Drive, ToothShape};
 use crate::fingers::beam::{FingerBeam, Fingers};
 use crate::load_sharing::{LoadParameters, curvature_per_mm, force_ratio};
@@ -75,10 +74,7 @@ fn contact_slice_mm2_per_n(drive: &Drive, p: &LoadParameters, contact: Contact, 
         return width_mm * FlatContact::new(flat_length_mm, width_mm).compliance_mm_per_n(modulus_mpa);
     }
     let radius_mm = drive.parameters().tooth_radius_mm;
-    let depth_mm = match &p.law {
-        ContactLaw::Johnson { depth_mm } => depth_mm.get(contact).unwrap_or(radius_mm),
-        ContactLaw::Linear | ContactLaw::Fixed(_) | ContactLaw::Palmgren | ContactLaw::Hertz => radius_mm,
-    };
+    let depth_mm = p.law.depth_mm(radius_mm).map_or(radius_mm, |depth_mm| *depth_mm.get(contact));
     let mate = p.materials.partner(contact);
     let [of_tooth, of_mate] = [&p.materials.teeth, mate].map(|body| body.compliance_per_mpa() / PI);
     let half_width_mm = 2.0 / (MODULUS_OVER_PRESSURE * curvature_per_mm);

@@ -73,7 +73,8 @@ pub static QUANTITIES: [Quantity; 61] = [
         |variant| Ok(variant.drive.tooth_width_mm()),
     )
     .not_below_zero()
-    .depending_on(&["/drive/teeth"]),
+    .depending_on(&["/drive/teeth"])
+    .said_by("/drive/teeth/width_mm"),
     flag(
         "undercut",
         "True if the envelope of the teeth undercuts the ring's tips.",

@@ -104,7 +104,7 @@ pub(super) fn put_in(base: &mut Tree, place: &[String], value: Tree) {
 
 /// Returns the number of lobes of the base's wave generator. A missing wave generator becomes a harmonic path; a
 /// missing number of lobes becomes two.
-fn with_wave_generator(base: &mut Tree) -> Result<f64, NoAnswer> {
+pub(super) fn with_wave_generator(base: &mut Tree) -> Result<f64, NoAnswer> {
     const LOBES: &str = "/drive/wave_generator/lobes";
     const TWO: f64 = 2.0;
     const MOST: f64 = 1000.0;
