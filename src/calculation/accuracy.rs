@@ -15,7 +15,7 @@ use toothwave_solver::{
 use utoipa::ToSchema;
 
 use crate::design::{Design, ModelDocument, Refinements};
-use crate::forms::{Form, Format, Forms, csv_error};
+use crate::forms::{Form, Format, Forms, write_csv};
 use crate::json::word;
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 use crate::question::{Limits, Question, checked_drive, checked_load};
@@ -44,7 +44,6 @@ pub struct AccuracyAnswer {
     pub requested_error: f64,
     /// The fastest method with the design's own model that meets the requested error. Absent if none does.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub cheapest: Option<WayAnswer>,
     /// All methods, by model and then from coarse to fine.
     pub ways: Vec<WayAnswer>,
@@ -61,11 +60,9 @@ pub struct WayAnswer {
     pub law: LawName,
     /// Equal intervals of the period. Absent if there is a tolerance.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub samples: Option<u64>,
     /// Relative tolerance. Absent if there are samples.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub tolerance: Option<f64>,
     /// Largest relative error of the six peaks, compared with the converged peaks of the same model.
     pub error: f64,
@@ -75,7 +72,6 @@ pub struct WayAnswer {
     /// such a measurement, or if the design is outside the measured range for another reason than the law (see
     /// `model_error` of a sweep).
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub expected_model_error: Option<f64>,
     /// True if `error` is below a tenth of `expected_model_error`. A finer method gives digits that the model does not
     /// have.
@@ -349,7 +345,6 @@ impl Forms for AccuracyAnswer {
 
 impl AccuracyAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let mut csv = csv::Writer::from_writer(writer);
         let names = [
             "compatibility",
             "law",
@@ -362,23 +357,12 @@ impl AccuracyAnswer {
             "expected_model_error",
             "is_finer_than_model",
         ];
-        csv.write_record(names).map_err(csv_error)?;
-        for way in &self.ways {
-            csv.serialize((
-                way.compatibility,
-                way.law,
-                way.samples,
-                way.tolerance,
-                way.error,
-                way.model_difference,
-                way.solve_us,
-                way.states,
-                way.expected_model_error,
-                way.is_finer_than_model,
-            ))
-            .map_err(csv_error)?;
-        }
-        csv.flush()
+        let rows = self.ways.iter().map(|way| {
+            let points = (way.compatibility, way.law, way.samples, way.tolerance);
+            let measured = (way.error, way.model_difference, way.solve_us, way.states);
+            (points, measured, way.expected_model_error, way.is_finer_than_model)
+        });
+        write_csv(&names, rows, writer)
     }
 
     fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {

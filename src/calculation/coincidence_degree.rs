@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 
 use crate::design::Design;
 use crate::findings::{FindingAnswer, drive_findings, write_findings};
-use crate::forms::{Form, Format, Forms, csv_error};
+use crate::forms::{Form, Format, Forms, write_csv};
 use crate::geometry::{EngagementAnswer, UndercutAnswer};
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, checked_drive};
@@ -29,7 +29,6 @@ pub struct CoincidenceDegreeAnswer {
     pub teeth_in_mesh_per_zone: TeethInMesh,
     /// True if the zones are alike.
     #[serde(skip)]
-    #[schema(ignore)]
     zones_are_alike: bool,
     /// Undercut of the ring's tips.
     pub undercut: UndercutAnswer,
@@ -82,26 +81,17 @@ impl Forms for CoincidenceDegreeAnswer {
 
 impl CoincidenceDegreeAnswer {
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record([
+        let names = [
             "coincidence_degree",
             "engagement_start_deg",
             "engagement_end_deg",
             "teeth_in_mesh_per_zone_min",
             "teeth_in_mesh_per_zone_max",
             "period_deg",
-        ])
-        .map_err(csv_error)?;
-        csv.serialize((
-            self.coincidence_degree,
-            self.engagement.start_deg,
-            self.engagement.end_deg,
-            self.teeth_in_mesh_per_zone.min,
-            self.teeth_in_mesh_per_zone.max,
-            self.period_deg,
-        ))
-        .map_err(csv_error)?;
-        csv.flush()
+        ];
+        let EngagementAnswer { start_deg, end_deg } = self.engagement;
+        let TeethInMesh { min, max } = self.teeth_in_mesh_per_zone;
+        write_csv(&names, [(self.coincidence_degree, start_deg, end_deg, min, max, self.period_deg)], writer)
     }
 
     fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {

@@ -12,9 +12,6 @@ use serde_json::Serializer;
 use serde_json::ser::Formatter;
 
 /// Writes an object or an array as [`serde_json::to_writer`] does. Arrays hold either floats or none.
-///
-/// # Errors
-/// Those of the writer.
 pub fn write(value: &impl Serialize, writer: &mut impl Write) -> io::Result<()> {
     let columns = Columns { kept: [0.0; KEPT], count: 0 };
     Ok(value.serialize(&mut Serializer::with_formatter(writer, columns))?)
@@ -92,48 +89,5 @@ impl Formatter for Columns {
     fn end_object<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
         self.write_kept(writer)?;
         writer.write_all(b"}")
-    }
-}
-
-#[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "tests")]
-mod tests {
-    use serde_json::json;
-
-    use super::write;
-
-    fn text(value: &impl serde::Serialize) -> String {
-        let mut text = Vec::new();
-        write(value, &mut text).unwrap();
-        String::from_utf8(text).unwrap()
-    }
-
-    #[test]
-    fn writes_same_bytes_as_serde_json() {
-        for count in 0..40 {
-            let column: Vec<_> = (0..count).map(|i| (f64::from(i / 3) * 0.1).tan()).collect();
-            let equal: Vec<_> = (0..count).map(|_| -2.225_073_858_507_201_4e-308).collect();
-            let points: Vec<_> = column.iter().map(|&x| [x, -x]).collect();
-            let value = json!({
-                "number": 1e300, "column": column, "teeth": [1, 2, 3], "points": points, "none": null, "equal": equal, "word": "é\n",
-                "nested": [{"x": 0.5}, {"x": 0.5, "loaded": [true, false]}, {}, []], "last": 5e-324,
-            });
-            assert_eq!(text(&value), value.to_string());
-            assert_eq!(text(&column), serde_json::to_string(&column).unwrap());
-            assert_eq!(text(&points), serde_json::to_string(&points).unwrap());
-        }
-    }
-
-    #[test]
-    fn writes_non_finite_numbers_as_null() {
-        for values in [[f64::NAN, 1.5, 2.5], [1.5, f64::NAN, 2.5], [1.5, 2.5, f64::INFINITY]] {
-            assert_eq!(text(&values), serde_json::to_string(&values).unwrap());
-            assert_eq!(text(&[values; 9]), serde_json::to_string(&[values; 9]).unwrap());
-        }
-    }
-
-    #[test]
-    fn keeps_sign_of_zero() {
-        assert_eq!(text(&[0.0, -0.0, -0.0, 0.0]), "[0.0,-0.0,-0.0,0.0]");
     }
 }

@@ -4,38 +4,25 @@ use serde::{Serialize, Serializer};
 use toothwave_solver::drive::Draft;
 use toothwave_solver::{Contact, SolveError, model_error};
 
-use crate::design::{DeprecatedField, Design, RefinementsDocument};
+use crate::design::{DEPRECATED_SWITCHES, Design, RefinementsDocument};
 use crate::field::{FieldCode, contact_name};
 use crate::json::{self, Fault, Tree};
 use crate::no_answer::NoAnswer;
 
-const SWITCHES: [DeprecatedField; 3] =
-    [DeprecatedField::RingTeethBend, DeprecatedField::WaveGeneratorMoves, DeprecatedField::CornerContact];
-
 /// The design document that means the same without deprecated fields.
-///
-/// # Errors
-/// Fails if the text is no design document or contradicts itself.
 pub fn converted(text: &[u8]) -> Result<String, NoAnswer> {
     let mut tree = json::tree(text)?;
     convert_design(&mut tree)?;
     written(&tree)
 }
 
-/// Returns a document as people write it: indented, whole numbers without a point.
-///
-/// # Errors
-/// A number is not finite.
+/// Returns a document as people write it: indented, whole numbers without a point. Fails if a number is not finite.
 pub fn written(tree: &Tree) -> Result<String, NoAnswer> {
     serde_json::to_string_pretty(&Written(tree)).map_err(NoAnswer::internal)
 }
 
-fn place(names: &[&str]) -> Vec<String> {
-    names.iter().map(|&name| name.into()).collect()
-}
-
 fn number(tree: &Tree, names: &[&str]) -> f64 {
-    match tree.at(&place(names)) {
+    match tree.at(names) {
         Some(Tree::Number(number)) => *number,
         _ => 0.0,
     }
@@ -46,16 +33,18 @@ fn convert_design(tree: &mut Tree) -> Result<(), NoAnswer> {
     design.require_one_clearance()?;
     design.require_one_choice_of_refinements()?;
     move_clearance(tree);
-    if design.deprecated_fields().iter().any(|field| SWITCHES.contains(field)) {
+    if design.deprecated_fields().iter().any(|field| DEPRECATED_SWITCHES.contains(field)) {
         let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
         let drive = draft.drive().ok_or_else(|| NoAnswer::impossible(&design.as_written(draft.violations())))?;
         let has_pointed_tips = model_error::has_pointed_tips(&drive);
-        remove_switches(tree);
+        for path in DEPRECATED_SWITCHES.into_iter().filter_map(json::path) {
+            tree.remove(&path);
+        }
         let by_default: Design = tree.read()?;
         if by_default.refinements(has_pointed_tips) != design.refinements(has_pointed_tips) {
             let refinements = RefinementsDocument::only(design.refinements(has_pointed_tips));
             let text = serde_json::to_vec(&refinements).map_err(NoAnswer::internal)?;
-            tree.set(&place(&["model", "refinements"]), json::tree(&text)?);
+            tree.set(&["model", "refinements"], json::tree(&text)?);
         }
     }
     remove_if_empty(tree, "model");
@@ -69,34 +58,23 @@ fn move_clearance(tree: &mut Tree) {
         let gap_um = number(tree, &["model", "clearance", &format!("{contact}_um")]);
         let part = ["parts", contact, "clearance_um"];
         if gap_um != 0.0 && number(tree, &part) + teeth_um == 0.0 {
-            tree.set(&place(&part), Tree::Number(gap_um));
+            tree.set(&part, Tree::Number(gap_um));
         }
     }
-    tree.remove(&place(&["model", "clearance"]));
-}
-
-fn remove_switches(tree: &mut Tree) {
-    for switch in SWITCHES {
-        if let Some(path) = json::path(switch.pointer()) {
-            tree.remove(&path);
-        }
-    }
+    tree.remove(&["model", "clearance"]);
 }
 
 fn remove_if_empty(tree: &mut Tree, name: &str) {
-    let path = place(&[name]);
-    if matches!(tree.at(&path), Some(Tree::Object(fields)) if fields.is_empty()) {
-        tree.remove(&path);
+    if matches!(tree.at(&[name]), Some(Tree::Object(fields)) if fields.is_empty()) {
+        tree.remove(&[name]);
     }
 }
 
-/// Moves the gaps of `model.clearance` in the base of a study that does not contradict itself.
-///
-/// # Errors
-/// The base has a switch of refinements. They depend on the geometry, which may vary.
+/// Moves the gaps of `model.clearance` in the base of a study that does not contradict itself. Fails if the base has a
+/// switch of refinements: they depend on the geometry, which may vary.
 pub fn convert_base(base: &mut Tree) -> Result<(), Fault> {
     let is_in = |pointer: &str| json::path(pointer).is_some_and(|path| base.at(&path).is_some());
-    if let Some(&switch) = SWITCHES.iter().find(|switch| is_in(switch.pointer())) {
+    if let Some(switch) = DEPRECATED_SWITCHES.into_iter().find(|switch| is_in(switch)) {
         return Err(no_replacement(switch));
     }
     move_clearance(base);
@@ -104,21 +82,19 @@ pub fn convert_base(base: &mut Tree) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Returns the pointer of the field that replaces a deprecated one, or the pointer itself.
-///
-/// # Errors
-/// The field is a switch of refinements.
+/// Returns the pointer of the field that replaces a deprecated one, or the pointer itself. Fails if the field is a
+/// switch of refinements.
 pub fn converted_pointer(pointer: &str) -> Result<String, Fault> {
-    if let Some(&switch) = SWITCHES.iter().find(|switch| switch.pointer() == pointer) {
+    if let Some(switch) = DEPRECATED_SWITCHES.into_iter().find(|&switch| switch == pointer) {
         return Err(no_replacement(switch));
     }
     let contact = pointer.strip_prefix("/model/clearance/").and_then(|name| name.strip_suffix("_um"));
     Ok(contact.map_or_else(|| pointer.into(), |contact| format!("/parts/{contact}/clearance_um")))
 }
 
-fn no_replacement(switch: DeprecatedField) -> Fault {
+fn no_replacement(switch: &str) -> Fault {
     let detail = "what takes its place depends on the geometry, which may vary; choose `model.refinements` instead";
-    Fault { pointer: switch.pointer().into(), code: FieldCode::ConflictingFields, detail: detail.into() }
+    Fault { pointer: switch.into(), code: FieldCode::ConflictingFields, detail: detail.into() }
 }
 
 struct Written<'a>(&'a Tree);

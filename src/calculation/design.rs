@@ -65,12 +65,10 @@ pub struct Design {
     #[serde(default)]
     pub materials: Materials,
     /// Load. Needed for a sweep only.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub load: Option<LoadDocument>,
     /// Friction. Used by a sweep only. Default: friction is not calculated.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionDocument>,
     /// The model of load sharing.
     #[serde(default)]
@@ -139,9 +137,6 @@ fn one_torque(input_nm: Option<f64>, output_nm: Option<f64>, pointer: String) ->
 
 impl Design {
     /// Reads a document from text and normalises it.
-    ///
-    /// # Errors
-    /// The first structural fault of the text.
     pub fn read(text: &[u8]) -> Result<Self, NoAnswer> {
         Ok(json::read::<Self>(text)?.normalised())
     }
@@ -201,10 +196,8 @@ impl Design {
         violations.iter().filter_map(as_written).collect()
     }
 
-    /// Returns the parameters of the load, for a drive with or without pointed or bored tips.
-    ///
-    /// # Errors
-    /// A fault if the document has no load, or not exactly one torque.
+    /// Returns the parameters of the load, for a drive with or without pointed or bored tips. Fails without a load, or
+    /// without exactly one torque.
     pub fn load_parameters(&self, has_pointed_tips: bool) -> Result<LoadParameters, Fault> {
         self.require_one_clearance()?;
         self.require_one_choice_of_refinements()?;
@@ -255,9 +248,6 @@ impl Design {
     }
 
     /// Returns the points of the duty, or a single one without duty; none without a load.
-    ///
-    /// # Errors
-    /// As [`Self::load_parameters`].
     pub fn duty(&self) -> Result<Duty, Fault> {
         self.load.as_ref().map_or_else(|| Ok(Duty::default()), |load| self.duty_of(load))
     }
@@ -305,9 +295,6 @@ impl Design {
 
     /// Returns every value of the duty that is out of its range, or else shares that do not add up to one. Without a
     /// duty it checks the speed of the load.
-    ///
-    /// # Errors
-    /// As [`Self::load_parameters`].
     pub fn duty_violations(&self) -> Result<Vec<Violation>, Fault> {
         let Duty { points, is_asked, .. } = self.duty()?;
         if !is_asked {
@@ -343,19 +330,15 @@ impl Design {
         checks.into_iter().filter_map(Result::err).find(|fault| fault.code == FieldCode::ConflictingFields)
     }
 
-    /// Returns the parameters of the losses, if friction is given.
-    ///
-    /// # Errors
-    /// Every value that is out of its range, and a rating of a bearing that this wave generator has not.
+    /// Returns the parameters of the losses, if friction is given. Fails also if a bearing has a rating and the wave
+    /// generator is no eccentric circle.
     pub fn loss_parameters(&self) -> Result<Option<LossParameters>, Vec<Violation>> {
         let is_eccentric = self.drive_parameters().wave_generator.is_eccentric_circle();
         self.friction.as_ref().map(|friction| friction.loss_parameters(is_eccentric)).transpose()
     }
 
-    /// Returns the input angles of the sweep.
-    ///
-    /// # Errors
-    /// A fault if the document has both samples and a tolerance; inside, the violation of a range.
+    /// Returns the input angles of the sweep. Fails if the document has both samples and a tolerance; inside is the
+    /// violation of a range.
     pub fn sweep_points(&self, max_states: u64) -> Result<Result<Points, Violation>, Fault> {
         let SweepDocument { samples, tolerance, .. } = self.sweep;
         match (samples, tolerance) {
@@ -373,18 +356,13 @@ impl Design {
     }
 
     /// Returns the requested relative error.
-    ///
-    /// # Errors
-    /// The violation of its range.
     pub fn requested_error(&self) -> Result<f64, Violation> {
         let requested_error = self.accuracy.requested_error;
         Parameter::RequestedError.check(requested_error).map_or(Ok(requested_error), Err)
     }
 
-    /// Returns the dimensions that the mechanics do not determine.
-    ///
-    /// # Errors
-    /// A fault if the document gives a contact two different gaps.
+    /// Returns the dimensions that the mechanics do not determine. Fails if the document gives a contact two different
+    /// gaps.
     pub fn parts_parameters(&self) -> Result<PartsParameters, Fault> {
         self.require_one_clearance()?;
         let PartsDocument { wave_generator, ring, carrier, teeth: _ } = &self.parts;
@@ -409,9 +387,6 @@ impl Design {
     }
 
     /// Returns the parameters of the carrier's fingers.
-    ///
-    /// # Errors
-    /// Every value that is out of its range.
     pub fn finger_parameters(&self) -> Result<FingerParameters, Vec<Violation>> {
         let CarrierPartDocument { fingers, finger_fillet_radius_mm, strength, .. } = &self.parts.carrier;
         let fillet = finger_fillet_radius_mm.map(|radius_mm| (Parameter::FingerFilletRadius, radius_mm));
@@ -440,9 +415,6 @@ impl Design {
     }
 
     /// Returns the parameters of the profiles.
-    ///
-    /// # Errors
-    /// The violation of the tolerance's range.
     pub fn profile_parameters(&self, max_points: u64) -> Result<ProfileParameters, Violation> {
         let chord_tolerance_mm = self.profile.chord_tolerance_mm;
         let extent = self.profile.extent;

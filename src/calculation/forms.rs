@@ -124,9 +124,6 @@ pub trait Forms: Serialize + Sized + 'static {
     }
 
     /// Writes the answer in one of its formats, or else as JSON.
-    ///
-    /// # Errors
-    /// The errors of the writer.
     fn write(&self, format: Format, writer: &mut impl Write) -> io::Result<()> {
         match Self::FORMS.iter().find(|(known, _)| *known == format.offered()) {
             Some((_, form)) if format == Format::CsvComma => form(self, &mut DecimalComma::new(writer)),
@@ -134,6 +131,18 @@ pub trait Forms: Serialize + Sized + 'static {
             None => columns::write(self, writer),
         }
     }
+}
+
+/// Writes rows of CSV below their names.
+pub(crate) fn write_csv(
+    names: &[&str],
+    rows: impl IntoIterator<Item = impl Serialize>,
+    writer: &mut dyn Write,
+) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(writer);
+    csv.write_record(names).map_err(csv_error)?;
+    rows.into_iter().try_for_each(|row| csv.serialize(row).map_err(csv_error))?;
+    csv.flush()
 }
 
 /// Converts a CSV error to the I/O error of its writer. Its kind distinguishes a closed pipe from a full disk.

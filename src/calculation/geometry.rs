@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 
 use crate::design::Design;
 use crate::findings::{FindingAnswer, drive_findings, write_findings};
-use crate::forms::{Form, Format, Forms, csv_error};
+use crate::forms::{Form, Format, Forms, write_csv};
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question, checked_drive, require_finite};
 
@@ -78,7 +78,6 @@ pub struct UndercutAnswer {
     pub occurs: bool,
     /// Smallest tooth radius with undercut. Absent if no radius has it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub critical_tooth_radius_mm: Option<f64>,
 }
 
@@ -137,7 +136,6 @@ pub struct CarrierAnswer {
     /// The finger between slots 0 and 1 of a carrier that fills the annulus. Absent if no material is left between the
     /// slots.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub finger: Option<FingerAnswer>,
 }
 
@@ -332,19 +330,15 @@ impl GeometryAnswer {
     }
 
     fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record(["profile", "x_mm", "y_mm"]).map_err(csv_error)?;
         let profiles = [
             ("ring", &self.ring.profile),
             ("wave_generator", &self.wave_generator.profile),
             ("tooth_center_path", &self.tooth_center_path),
         ];
-        for (name, profile) in profiles {
-            for point in profile.x_mm.iter().zip(&profile.y_mm) {
-                csv.serialize((name, point.0, point.1)).map_err(csv_error)?;
-            }
-        }
-        csv.flush()
+        let rows = profiles.into_iter().flat_map(|(name, profile)| {
+            profile.x_mm.iter().zip(&profile.y_mm).map(move |(x_mm, y_mm)| (name, x_mm, y_mm))
+        });
+        write_csv(&["profile", "x_mm", "y_mm"], rows, writer)
     }
 
     fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {

@@ -8,52 +8,34 @@ mod deserializer;
 mod fault;
 mod tree;
 
-use fault::escaped;
 use serde::{Deserialize, Serialize, de};
 
 use crate::field::FieldCode;
+use crate::no_answer::{NoAnswer, NoAnswerCode};
 
-pub use fault::Fault;
+pub use fault::{Fault, escaped};
 pub(crate) use tree::ANY;
 pub use tree::{Tree, path};
-
-/// Reason why a text is not a document of the expected form.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ReadError {
-    /// The text is not JSON.
-    Malformed {
-        /// Message of the parser, with line and column.
-        detail: String,
-    },
-    /// The JSON has another form.
-    Fault(Fault),
-}
 
 /// Byte order mark of some editors. RFC 8259 allows a reader to ignore it.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
 /// Reads a document.
-///
-/// # Errors
-/// See [`ReadError`].
-pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, ReadError> {
-    tree(text)?.read().map_err(ReadError::Fault)
+pub fn read<'de, T: Deserialize<'de>>(text: &[u8]) -> Result<T, NoAnswer> {
+    Ok(tree(text)?.read()?)
 }
 
 /// Parses a text to a tree.
-///
-/// # Errors
-/// See [`ReadError`].
-pub fn tree(text: &[u8]) -> Result<Tree, ReadError> {
+pub fn tree(text: &[u8]) -> Result<Tree, NoAnswer> {
     if matches!(text, [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] | [0, _, ..] | [_, 0, ..]) {
         // In UTF-16 every ASCII letter has a byte that is zero.
         let detail =
             "the document is UTF-16; save it as UTF-8 (in Windows PowerShell `| Out-File -Encoding utf8`, not `>`)";
-        return Err(ReadError::Malformed { detail: detail.into() });
+        return Err(malformed(detail));
     }
     let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     if text.trim_ascii().is_empty() {
-        return Err(ReadError::Malformed { detail: "the body is empty. Send a design document".into() });
+        return Err(malformed("the body is empty. Send a design document"));
     }
     let mut parser = serde_json::Deserializer::from_slice(text);
     let tree: Tree = serde_path_to_error::deserialize(&mut parser).map_err(|error| {
@@ -75,16 +57,26 @@ pub fn tree(text: &[u8]) -> Result<Tree, ReadError> {
                     serde_path_to_error::Segment::Seq { index } => Some(format!("/{index}")),
                     _ => None,
                 });
-                ReadError::Fault(Fault { pointer: pointer.collect(), code, detail: detail.into() })
+                Fault { pointer: pointer.collect(), code, detail: detail.into() }.into()
             }
-            (_, Err(malformed)) => {
-                ReadError::Malformed { detail: format!("{malformed}. Send one complete JSON document") }
-            }
-            (None, Ok(_)) => ReadError::Malformed { detail: error.inner().to_string() },
+            (_, Err(error)) => malformed(format!("{error}. Send one complete JSON document")),
+            (None, Ok(_)) => malformed(error.inner().to_string()),
         }
     })?;
-    parser.end().map_err(|error| ReadError::Malformed { detail: error.to_string() })?;
+    parser.end().map_err(|error| malformed(error.to_string()))?;
     Ok(tree)
+}
+
+/// Deserializes a number that may be null.
+pub(crate) fn or_null<'de, D: de::Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    match Tree::deserialize(deserializer)? {
+        Tree::Null => Ok(None),
+        number => number.read().map(Some).map_err(|fault| de::Error::custom(fault.detail)),
+    }
+}
+
+fn malformed(detail: impl Into<String>) -> NoAnswer {
+    NoAnswer::new(NoAnswerCode::MalformedJson, detail)
 }
 
 /// Returns a word of the API, as in JSON.

@@ -27,6 +27,6 @@ pub mod question;
 pub mod schema_ranges;
 pub mod strengths;
 pub mod sweep;
-mod union;
+pub mod union;
 
 pub use arithmetic::origin;

@@ -20,11 +20,9 @@ pub struct MaterialPreset {
     /// The contact stress that it may have, for `load.allowable_stress_mpa`: under rolling with lubrication, without a factor of safety; left out
     /// where none is published as a Hertz stress.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub allowable_stress_mpa: Option<f64>,
     /// Source.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub allowable_stress_source: Option<&'static str>,
 }
 

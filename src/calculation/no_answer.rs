@@ -6,7 +6,7 @@ use toothwave_solver::{SolveError, Violation};
 use utoipa::ToSchema;
 
 use crate::field::{FieldCode, FieldError};
-use crate::json::{Fault, ReadError};
+use crate::json::Fault;
 
 /// Reason why a document has no answer.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,15 +111,6 @@ impl std::fmt::Display for NoAnswer {
 }
 
 impl std::error::Error for NoAnswer {}
-
-impl From<ReadError> for NoAnswer {
-    fn from(error: ReadError) -> Self {
-        match error {
-            ReadError::Malformed { detail } => Self::new(NoAnswerCode::MalformedJson, detail),
-            ReadError::Fault(fault) => fault.into(),
-        }
-    }
-}
 
 impl From<Fault> for NoAnswer {
     fn from(Fault { pointer, code, detail }: Fault) -> Self {

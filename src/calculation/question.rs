@@ -46,9 +46,6 @@ pub trait Question: Send + 'static {
     fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a;
 
     /// Checks these parts and reports every impossible value.
-    ///
-    /// # Errors
-    /// Names the wrong fields.
     fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer>;
 
     /// Upper bound of the bytes of the answer with its text in this format, or none if it is unknown before solving.
@@ -62,9 +59,6 @@ pub trait Question: Send + 'static {
     }
 
     /// Computes the answer.
-    ///
-    /// # Errors
-    /// The reason for a missing answer, or `stop` was set.
     fn answer(checked: &Self::Checked, stop: &dyn Stop) -> Result<Self::Answer, NoAnswer>;
 
     /// Returns the key of the answer in this form. Equal keys mean equal bytes in every process.
@@ -73,20 +67,14 @@ pub trait Question: Send + 'static {
     }
 
     /// Parses, checks and computes.
-    ///
-    /// # Errors
-    /// The reason for a missing answer.
     fn ask(&self, document: &[u8], limits: &Limits, stop: &dyn Stop) -> Result<Self::Answer, NoAnswer> {
         Self::answer(&self.check(&Design::read(document)?, limits)?, stop)
     }
 }
 
 /// Checks that all values are finite. serde_json would write `null` silently.
-///
-/// # Errors
-/// An internal error of the calculation.
-pub(crate) fn require_finite<'a>(columns: impl IntoIterator<Item = &'a Vec<f64>>) -> Result<(), NoAnswer> {
-    if columns.into_iter().all(|column| column.iter().all(|value| value.is_finite())) {
+pub(crate) fn require_finite(columns: impl IntoIterator<Item = impl AsRef<[f64]>>) -> Result<(), NoAnswer> {
+    if columns.into_iter().all(|column| column.as_ref().iter().all(|value| value.is_finite())) {
         Ok(())
     } else {
         Err(NoAnswer::internal("a result is not finite"))
@@ -94,19 +82,14 @@ pub(crate) fn require_finite<'a>(columns: impl IntoIterator<Item = &'a Vec<f64>>
 }
 
 /// Returns the drive of a document, as far as it is possible, and adds its violations.
-///
-/// # Errors
-/// The geometry does not converge.
 pub(crate) fn checked_drive(design: &Design, violations: &mut Vec<Violation>) -> Result<Draft, NoAnswer> {
     let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
     violations.extend(design.as_written(draft.violations()));
     Ok(draft)
 }
 
-/// Returns the load of a document for a checked drive, and adds its violations.
-///
-/// # Errors
-/// The document has no load, or not exactly one torque, or the geometry does not converge.
+/// Returns the load of a document for a checked drive, and adds its violations. Fails without a load, or without
+/// exactly one torque.
 pub(crate) fn checked_load(
     design: &Design,
     draft: &Draft,

@@ -121,9 +121,6 @@ impl CheckedSweep {
     }
 
     /// Returns the loss totals over all points of a duty, given the sweep of the hardest; none without friction.
-    ///
-    /// # Errors
-    /// The errors of [`Self::solve`].
     pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotals>, SolveError> {
         let forces = match self.losses {
             Some(LossParameters { bearing: Some(_), .. }) => self.radial_forces(hardest, stop)?,
@@ -145,9 +142,6 @@ impl CheckedSweep {
     }
 
     /// Returns the radial forces of the teeth on the wave generator.
-    ///
-    /// # Errors
-    /// The errors of [`Self::solve`].
     pub fn radial_forces(
         &self,
         sweep: &solver::Sweep,
@@ -157,9 +151,6 @@ impl CheckedSweep {
     }
 
     /// Solves the sweep; for a duty, that of its hardest point. Stresses are means along the teeth.
-    ///
-    /// # Errors
-    /// The errors of [`solver::sweep_with_deviations`].
     pub fn solve(&self, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
         self.solve_at(self.points, stop)
     }
@@ -169,9 +160,6 @@ impl CheckedSweep {
     }
 
     /// Solves for the peaks only. Stresses are means along the teeth.
-    ///
-    /// # Errors
-    /// The errors of [`Self::solve`].
     pub fn peaks(&self, stop: &dyn Stop) -> Result<solver::SweepPeaks, SolveError> {
         if !self.deviations.is_nil() {
             return Ok((&self.solve(stop)?).into());
@@ -382,18 +370,10 @@ impl Question for Sweep {
             ),
             findings,
         };
-        let states = &answer.states;
-        require_finite([
-            &states.center_radius_mm,
-            &states.wave_generator_angle_deg,
-            &states.ring_angle_deg,
-            &states.force_wave_generator_n,
-            &states.force_ring_n,
-            &states.force_carrier_n,
-            &states.stress_wave_generator_mpa,
-            &states.stress_ring_mpa,
-            &states.stress_carrier_mpa,
-        ])?;
+        require_finite(answer.columns().into_iter().filter_map(|(_, column)| match column {
+            Column::Numbers(numbers) => Some(numbers),
+            Column::Counts(_) | Column::Flags(_) | Column::Rolls(_) => None,
+        }))?;
         if let Some(wind_up) = &answer.wind_up {
             let unloaded = wind_up.unloaded_wind_up_deg.iter();
             require_finite(unloaded.chain([&wind_up.wind_up_deg, &wind_up.torsional_stiffness_nm_per_rad]))?;

@@ -1,137 +1,111 @@
-//! Objects of several kinds, told apart by a word in one of their fields.
+//! Values of several kinds: objects that are told apart by a word in one of their fields, and an object or one value.
 
-use utoipa::ToSchema;
-use utoipa::openapi::schema::{Discriminator, ObjectBuilder, OneOfBuilder, Schema, Type};
-use utoipa::openapi::{Ref, RefOr};
+use serde_json::{Value, json};
 
-/// A kind of a union, as the API document has it.
-pub(crate) struct KindSchema {
-    /// The word that names the kind.
-    pub(crate) word: &'static str,
-    /// The name of its schema.
-    pub(crate) name: String,
-    /// Fields without the word.
-    pub(crate) fields: RefOr<Schema>,
-}
-
-impl KindSchema {
-    pub(crate) fn of<T: ToSchema>(union: &str, word: &'static str) -> Self {
-        let mut name = union.to_owned();
-        for part in word.split('_') {
-            let (first, rest) = part.split_at(1);
-            name.push_str(&first.to_uppercase());
-            name.push_str(rest);
-        }
-        Self { word, name, fields: T::schema() }
-    }
-
-    /// The fields with the word. It is required unless this kind is meant where it is left out.
-    fn with_word(&self, tag: &str, by_default: &[&str]) -> RefOr<Schema> {
-        let mut schema = self.fields.clone();
-        if let RefOr::T(Schema::Object(object)) = &mut schema {
-            let mut word = ObjectBuilder::new().schema_type(Type::String).enum_values(Some([self.word]));
-            if by_default.contains(&self.word) {
-                word = word.default(Some(self.word.into()));
-            } else {
-                object.required.insert(0, tag.into());
-            }
-            object.properties.insert(tag.into(), Schema::Object(word.build()).into());
-        }
-        schema
-    }
-
-    fn reference(&self) -> Ref {
-        Ref::from_schema_name(&self.name)
-    }
-}
-
-/// One of these kinds. Generators read no discriminator that a kind may lack: with a default the kinds are told apart by their words alone.
-pub(crate) fn schema(description: &str, tag: &str, kinds: &[KindSchema], by_default: &[&str]) -> RefOr<Schema> {
-    let mapping = kinds.iter().map(|kind| (kind.word, kind.reference().ref_location));
-    let discriminator = by_default.is_empty().then(|| Discriminator::with_mapping(tag, mapping));
-    let mut union = OneOfBuilder::new().description(Some(description.trim())).discriminator(discriminator);
-    for kind in kinds {
-        union = union.item(kind.reference());
-    }
-    union.into()
-}
-
-/// The schemas that [`schema`] refers to.
-pub(crate) fn schemas(
-    tag: &str,
-    kinds: &[KindSchema],
-    by_default: &[&str],
-    schemas: &mut Vec<(String, RefOr<Schema>)>,
-) {
-    schemas.extend(kinds.iter().map(|kind| (kind.name.clone(), kind.with_word(tag, by_default))));
-}
-
-/// Makes an enum of kinds of object. It is written with its word always, read as [`crate::json`] reads unions, and in the API document it is a
-/// `oneOf` with a discriminator.
+/// Makes an enum of kinds of object. It is written with its word always, and read as [`crate::json`] reads unions.
+#[macro_export]
 macro_rules! union {
     (
-        $(#[doc = $doc:literal])+
-        pub enum $union:ident as $name:literal by $tag:literal read $read:literal $(default $by_default:literal)? {
-            $($(#[doc = $kind_doc:literal])+ $kind:ident($fields:ty) = $word:literal),+ $(,)?
+        $(#[$meta:meta])+
+        pub enum $union:ident by $tag:tt read $read:literal {
+            $($(#[$kind_meta:meta])+ $kind:ident($fields:ty)),+ $(,)?
         }
     ) => {
-        $(#[doc = $doc])+
-        #[derive(Debug, Clone, PartialEq)]
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, utoipa::ToSchema)]
+        #[serde(tag = $tag, rename_all = "snake_case")]
+        $(#[$meta])+
         pub enum $union {
-            $($(#[doc = $kind_doc])+ $kind($fields)),+
-        }
-
-        impl serde::Serialize for $union {
-            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                #[derive(serde::Serialize)]
-                #[serde(tag = $tag)]
-                enum Written<'a> {
-                    $(#[serde(rename = $word)] $kind(&'a $fields)),+
-                }
-                match self {
-                    $(Self::$kind(fields) => Written::$kind(fields)),+
-                }
-                .serialize(serializer)
-            }
+            $($(#[$kind_meta])+ $kind($fields)),+
         }
 
         impl<'de> serde::Deserialize<'de> for $union {
             fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
                 #[derive(serde::Deserialize)]
-                #[serde(rename = $read)]
+                #[serde(rename = $read, rename_all = "snake_case")]
                 enum Read {
-                    $(#[serde(rename = $word)] $kind($fields)),+
+                    $($kind($fields)),+
                 }
                 Ok(match Read::deserialize(deserializer)? {
                     $(Read::$kind(fields) => Self::$kind(fields)),+
                 })
             }
         }
+    };
+}
 
-        impl $union {
-            const BY_DEFAULT: &[&str] = &[$($by_default)?];
+/// Reads one value, or else an object. The JSON type tells them apart, so that an error keeps its place. With `as` it is a
+/// `oneOf` in the API document.
+#[macro_export]
+macro_rules! either {
+    (
+        $document:ident expects $expected:literal:
+        $visit:ident($one:ident: $of:ty) => $read:expr, $object:ty => $given:expr $(,)?
+    ) => {
+        impl<'de> serde::Deserialize<'de> for $document {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct Either;
 
-            fn kinds() -> Vec<$crate::union::KindSchema> {
-                vec![$($crate::union::KindSchema::of::<$fields>($name, $word)),+]
+                impl<'de> serde::de::Visitor<'de> for Either {
+                    type Value = $document;
+
+                    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        f.write_str($expected)
+                    }
+
+                    fn $visit<E: serde::de::Error>(self, $one: $of) -> Result<$document, E> {
+                        $read
+                    }
+
+                    fn visit_map<A: serde::de::MapAccess<'de>>(self, fields: A) -> Result<$document, A::Error> {
+                        let fields = serde::de::value::MapAccessDeserializer::new(fields);
+                        <$object as serde::Deserialize>::deserialize(fields).map($given)
+                    }
+                }
+
+                deserializer.deserialize_any(Either)
             }
         }
+    };
+    (
+        $document:ident as $name:literal ($description:literal, $schema:expr) expects $expected:literal:
+        $visit:ident($one:ident: $of:ty) => $read:expr, $object:ty => $given:expr $(,)?
+    ) => {
+        $crate::either!($document expects $expected: $visit($one: $of) => $read, $object => $given);
 
-        impl utoipa::PartialSchema for $union {
+        impl utoipa::PartialSchema for $document {
             fn schema() -> utoipa::openapi::RefOr<utoipa::openapi::schema::Schema> {
-                $crate::union::schema(concat!($($doc, "\n"),+), $tag, &Self::kinds(), Self::BY_DEFAULT)
+                utoipa::openapi::schema::OneOfBuilder::new()
+                    .description(Some($description))
+                    .item($schema)
+                    .item(utoipa::openapi::Ref::from_schema_name(<$object as utoipa::ToSchema>::name()))
+                    .into()
             }
         }
 
-        impl utoipa::ToSchema for $union {
+        impl utoipa::ToSchema for $document {
             fn name() -> std::borrow::Cow<'static, str> {
                 $name.into()
             }
 
             fn schemas(schemas: &mut Vec<(String, utoipa::openapi::RefOr<utoipa::openapi::schema::Schema>)>) {
-                $crate::union::schemas($tag, &Self::kinds(), Self::BY_DEFAULT, schemas);
-                $(<$fields as utoipa::ToSchema>::schemas(schemas);)+
+                let name = <$object as utoipa::ToSchema>::name();
+                schemas.push((name.into(), <$object as utoipa::PartialSchema>::schema()));
             }
         }
     };
 }
-pub(crate) use union;
+
+/// The kinds that are meant if the word is left out: union, field of the word, word, schema of the kind.
+const KINDS_BY_DEFAULT: [[&str; 4]; 2] =
+    [["WaveGenerator", "kind", "ellipse", "WaveGeneratorEllipse"], ["Teeth", "shape", "cylinder", "TeethCylinder"]];
+
+/// Marks the kinds in the API document whose word may be left out. Generators read no discriminator that a kind may lack, so
+/// these unions have none.
+pub fn put_default_kinds(schemas: &mut Value) {
+    for [union, tag, word, kind] in KINDS_BY_DEFAULT {
+        schemas[kind]["properties"][tag]["default"] = json!(word);
+        let of_kind = schemas[kind]["required"].as_array_mut();
+        of_kind.into_iter().for_each(|required| required.retain(|name| name != tag));
+        schemas[union].as_object_mut().and_then(|union| union.remove("discriminator"));
+    }
+}

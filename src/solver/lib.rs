@@ -236,20 +236,6 @@ impl SolveError {
     }
 }
 
-/// Deserializes a field that may be left out but not be null.
-///
-/// # Errors
-/// Those of the field's type.
-#[cfg(feature = "document")]
-#[doc(hidden)]
-pub fn given<'de, D, T>(deserializer: D) -> Result<Option<T>, D::Error>
-where
-    D: serde::Deserializer<'de>,
-    T: serde::Deserialize<'de>,
-{
-    T::deserialize(deserializer).map(Some)
-}
-
 /// Stop signal, polled during a computation. If it is set, the computation returns [`SolveError::Stopped`]. It is
 /// passed as `dyn`, so that a sweep is compiled once, in this crate.
 pub trait Stop {

@@ -2,6 +2,7 @@
 
 use toothwave_calculation::field::{FieldCode, FieldError};
 use toothwave_calculation::json::Fault;
+pub(crate) use toothwave_calculation::json::escaped;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 
 use crate::quantity::Quantity;
@@ -18,11 +19,6 @@ pub(crate) fn beyond(pointer: &str, code: FieldCode, detail: impl Into<String>, 
         FieldError { pointer: pointer.into(), code, detail: detail.clone(), value: Some(value), limit: Some(limit) };
     let text = if pointer.is_empty() { detail } else { format!("{pointer}: {detail}") };
     NoAnswer::at_fields(NoAnswerCode::InvalidDocument, text, vec![error])
-}
-
-/// Escapes a name for a JSON pointer (RFC 6901).
-pub(crate) fn escaped(name: &str) -> String {
-    name.replace('~', "~0").replace('/', "~1")
 }
 
 /// Checks that a value lies within a range, and converts it to a whole number.

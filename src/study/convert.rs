@@ -9,13 +9,11 @@ use crate::study::{Limits, Study};
 /// Names of the lists of pointers into the design, in a study document.
 const LISTS_OF_POINTERS: [&str; 3] = ["over", "free", "inputs"];
 
-/// The document that means the same without deprecated fields, of a design or of a study.
-///
-/// # Errors
-/// Fails if the text is no such document or contradicts itself, or if a field has no replacement for all variants of a study.
+/// The document that means the same without deprecated fields, of a design or of a study. Fails if a field has no
+/// replacement for all variants of a study.
 pub fn converted(text: &[u8]) -> Result<String, NoAnswer> {
     let mut tree = json::tree(text)?;
-    if tree.at(&["study".into()]).is_none() {
+    if tree.at(&["study"]).is_none() {
         return convert::converted(text);
     }
     Study::read(text, &Limits::OFFLINE)?;
@@ -55,5 +53,5 @@ fn convert_start(design: &mut Tree, renamed: &[(String, String)]) {
             design.set(&new, value);
         }
     }
-    design.remove(&["model", "clearance"].map(String::from));
+    design.remove(&["model", "clearance"]);
 }

@@ -2,59 +2,36 @@
 
 use std::collections::BTreeMap;
 
-use serde::de::{self, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de};
 use toothwave_calculation::design::Whole;
 use toothwave_calculation::json::Tree;
+use toothwave_calculation::{either, union};
 use utoipa::ToSchema;
 
-/// Study document: a question about many variants of one design.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-#[serde(tag = "study", rename_all = "snake_case")]
-#[schema(as = Study, example = json!({
-    "study": "map",
-    "base": {
-        "drive": {
-            "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 },
-            "teeth": { "count": 28, "radius_mm": 5.0, "width_mm": 15.0 },
-            "ring": { "teeth": 26 }
+union! {
+    /// Study document: a question about many variants of one design.
+    #[schema(as = Study, example = json!({
+        "study": "map",
+        "base": {
+            "drive": {
+                "wave_generator": { "semi_major_mm": 58.0, "semi_minor_mm": 56.0 },
+                "teeth": { "count": 28, "radius_mm": 5.0, "width_mm": 15.0 },
+                "ring": { "teeth": 26 }
+            },
+            "load": { "input_torque_nm": 20.0 }
         },
-        "load": { "input_torque_nm": 20.0 }
-    },
-    "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 5 } },
-    "quantities": ["peak_stress_ring_mpa"]
-}))]
-pub enum StudyDocument {
-    /// Map: quantities over one or several parameters.
-    Map(MapDocument),
-    /// Search: the best designs within limits.
-    Search(SearchDocument),
-    /// Sensitivity: the effect of each input on each quantity.
-    Sensitivity(SensitivityDocument),
-    /// Tolerance study: the effect of deviations on each quantity.
-    Tolerance(ToleranceDocument),
-}
-
-impl<'de> Deserialize<'de> for StudyDocument {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(rename = "by:study")]
-        enum Read {
-            #[serde(rename = "map")]
-            Map(MapDocument),
-            #[serde(rename = "search")]
-            Search(SearchDocument),
-            #[serde(rename = "sensitivity")]
-            Sensitivity(SensitivityDocument),
-            #[serde(rename = "tolerance")]
-            Tolerance(ToleranceDocument),
-        }
-        Ok(match Read::deserialize(deserializer)? {
-            Read::Map(document) => Self::Map(document),
-            Read::Search(document) => Self::Search(document),
-            Read::Sensitivity(document) => Self::Sensitivity(document),
-            Read::Tolerance(document) => Self::Tolerance(document),
-        })
+        "over": { "/drive/teeth/radius_mm": { "min": 3.0, "max": 7.0, "steps": 5 } },
+        "quantities": ["peak_stress_ring_mpa"]
+    }))]
+    pub enum StudyDocument by "study" read "by:study" {
+        /// Map: quantities over one or several parameters.
+        Map(MapDocument),
+        /// Search: the best designs within limits.
+        Search(SearchDocument),
+        /// Sensitivity: the effect of each input on each quantity.
+        Sensitivity(SensitivityDocument),
+        /// Tolerance study: the effect of deviations on each quantity.
+        Tolerance(ToleranceDocument),
     }
 }
 
@@ -77,23 +54,10 @@ impl ToSchema for Base {}
 
 impl<'de> Deserialize<'de> for Base {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct AnyObject;
-        impl<'de> Visitor<'de> for AnyObject {
-            type Value = Tree;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("an object")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Tree, A::Error> {
-                let mut fields = Vec::new();
-                while let Some(entry) = entries.next_entry::<String, Tree>()? {
-                    fields.push(entry);
-                }
-                Ok(Tree::Object(fields))
-            }
+        match Tree::deserialize(deserializer)? {
+            object @ Tree::Object(_) => Ok(Self(object)),
+            other => Err(de::Error::invalid_type(other.unexpected(), &"an object")),
         }
-        deserializer.deserialize_map(AnyObject).map(Self)
     }
 }
 
@@ -115,20 +79,17 @@ pub struct MapDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct OverDocument {
     /// Smallest value.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
     /// Largest value.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
     /// Number of equidistant values, both ends included. Default for a whole number: every value.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, minimum = 1, maximum = 1000000, required = false)]
     pub steps: Option<Whole>,
     /// List of values, instead of a range.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub one_of: Option<Vec<ChoiceDocument>>,
 }
 
@@ -147,27 +108,12 @@ pub enum ChoiceDocument {
 
 impl<'de> Deserialize<'de> for ChoiceDocument {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Any;
-        impl Visitor<'_> for Any {
-            type Value = ChoiceDocument;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("a word, a number, `true` or `false`")
-            }
-
-            fn visit_str<E>(self, word: &str) -> Result<ChoiceDocument, E> {
-                Ok(ChoiceDocument::Word(word.into()))
-            }
-
-            fn visit_f64<E>(self, number: f64) -> Result<ChoiceDocument, E> {
-                Ok(ChoiceDocument::Number(number))
-            }
-
-            fn visit_bool<E>(self, flag: bool) -> Result<ChoiceDocument, E> {
-                Ok(ChoiceDocument::Flag(flag))
-            }
+        match Tree::deserialize(deserializer)? {
+            Tree::Text(word) => Ok(Self::Word(word)),
+            Tree::Number(number) => Ok(Self::Number(number)),
+            Tree::Bool(flag) => Ok(Self::Flag(flag)),
+            other => Err(de::Error::invalid_type(other.unexpected(), &"a word, a number, `true` or `false`")),
         }
-        deserializer.deserialize_any(Any)
     }
 }
 
@@ -216,16 +162,13 @@ pub struct SearchDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct FreeDocument {
     /// Smallest value.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
     /// Largest value.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
     /// List of values, instead of a range.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub one_of: Option<Vec<ChoiceDocument>>,
 }
 
@@ -245,35 +188,17 @@ pub enum RequireDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct RangeDocument {
     /// Smallest allowed value.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
     /// Largest allowed value.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
 }
 
-impl<'de> Deserialize<'de> for RequireDocument {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct FlagOrRange;
-        impl<'de> Visitor<'de> for FlagOrRange {
-            type Value = RequireDocument;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("`true`, `false` or an object with `min` or `max`")
-            }
-
-            fn visit_bool<E>(self, flag: bool) -> Result<RequireDocument, E> {
-                Ok(RequireDocument::Flag(flag))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, entries: A) -> Result<RequireDocument, A::Error> {
-                RangeDocument::deserialize(de::value::MapAccessDeserializer::new(entries)).map(RequireDocument::Range)
-            }
-        }
-        deserializer.deserialize_any(FlagOrRange)
-    }
+either! {
+    RequireDocument expects "`true`, `false` or an object with `min` or `max`":
+    visit_bool(flag: bool) => Ok(RequireDocument::Flag(flag)),
+    RangeDocument => RequireDocument::Range,
 }
 
 /// An objective: a quantity to minimise or maximise.
@@ -316,12 +241,12 @@ pub struct SensitivityDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct InputDocument {
     /// Step in the unit of the input.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0, nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
     pub plus_minus: Option<f64>,
     /// Step as a fraction of the value, instead of `plus_minus`.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0, maximum = 1.0, nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0, maximum = 1.0)]
     pub relative: Option<f64>,
 }
 
@@ -361,12 +286,12 @@ pub struct DistributionDocument {
     /// Kind of distribution.
     pub distribution: DistributionKind,
     /// Standard deviation of the normal distribution before truncation.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0, nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
     pub sigma: Option<f64>,
     /// Largest deviation: the normal distribution is truncated here, the uniform one ends here.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(exclusive_minimum = 0.0, nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0)]
     pub limit: Option<f64>,
 }
 

@@ -85,10 +85,8 @@ impl Gathered {
         }
     }
 
-    /// Writes one row for each computed variant, in order; nothing for a search.
-    ///
-    /// # Errors
-    /// Returns the writer's errors, and `Unsupported` for a format that is no table.
+    /// Writes one row for each computed variant, in order; nothing for a search. Fails with `Unsupported` for a format
+    /// that is no table.
     pub fn write_rows(&self, format: Format, writer: &mut dyn Write) -> io::Result<()> {
         match (self.rows_table(), format) {
             (None, _) => Ok(()),

@@ -20,13 +20,15 @@ pub(crate) fn id(
     limits: &question::Limits,
 ) -> Result<Key, NoAnswer> {
     let mut asked = tree_of(document)?;
-    asked.remove(&["base".into()]);
+    asked.remove(&["base"]);
     for (name, value) in resolved {
-        asked.set(&[name.into()], value);
+        asked.set(&[name], value);
     }
-    let names = [String::from("quantities")];
-    if asked.at(&names).is_some() {
-        asked.set(&names, Tree::Array(quantities.iter().map(|quantity| Tree::Text(quantity.name.into())).collect()));
+    if asked.at(&["quantities"]).is_some() {
+        asked.set(
+            &["quantities"],
+            Tree::Array(quantities.iter().map(|quantity| Tree::Text(quantity.name.into())).collect()),
+        );
     }
     // The base is hashed as the designs at both ends of all ranges. The values that the study replaces do not count.
     let end = |is_low: bool| {
@@ -74,7 +76,7 @@ pub(crate) fn with_defaults_at<'a>(base: &Tree, pointers: impl Iterator<Item = &
 
 fn tree_of(document: &impl serde::Serialize) -> Result<Tree, NoAnswer> {
     let text = serde_json::to_vec(document).map_err(NoAnswer::internal)?;
-    Ok(json::tree(&text)?)
+    json::tree(&text)
 }
 
 fn hash_of(tree: &Tree) -> Result<String, NoAnswer> {

@@ -261,7 +261,6 @@ pub struct MapAnswer {
     /// Reasons for missing answers.
     pub reasons: Vec<ReasonAnswer>,
     #[serde(skip)]
-    #[schema(ignore)]
     quantities: Vec<&'static str>,
 }
 
@@ -272,11 +271,9 @@ pub struct AxisAnswer {
     pub pointer: String,
     /// Values, if they are numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub values: Option<Vec<f64>>,
     /// Values, if they are words.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub choices: Option<Vec<String>>,
 }
 

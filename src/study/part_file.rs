@@ -59,9 +59,6 @@ impl From<ParquetError> for PartError {
 
 impl Study {
     /// Returns a part of this study as the bytes of a Parquet file.
-    ///
-    /// # Errors
-    /// If the Parquet library refuses the table.
     pub fn part_bytes(&self, chunk: u64, part: &Part) -> io::Result<Vec<u8>> {
         let mut notes: Vec<_> = self.notes(chunk).map(|(name, value)| KeyValue::new(name.into(), value)).into();
         let without_columns = match part {
@@ -85,10 +82,8 @@ impl Study {
         Ok(bytes)
     }
 
-    /// Reads the part of a chunk from the bytes of its file.
-    ///
-    /// # Errors
-    /// If the bytes are damaged, or belong to another build, another study or another chunk.
+    /// Reads the part of a chunk from the bytes of its file. Fails if the bytes are damaged, or belong to another
+    /// build, another study or another chunk.
     pub fn read_part(&self, chunk: u64, bytes: Vec<u8>) -> Result<Part, PartError> {
         let file = SerializedFileReader::new(Bytes::from(bytes))?;
         let notes = file.metadata().file_metadata().key_value_metadata().into_iter().flatten();

@@ -17,27 +17,18 @@ pub struct PartFolder {
 
 impl PartFolder {
     /// Opens the folder at this path, and creates it if it does not exist.
-    ///
-    /// # Errors
-    /// Returns the file system's errors.
     pub fn create(path: &Path) -> io::Result<Self> {
         fs::create_dir_all(path)?;
         Self::open(path)
     }
 
     /// Opens the folder at this path.
-    ///
-    /// # Errors
-    /// If the path is not a readable folder.
     pub fn open(path: &Path) -> io::Result<Self> {
         fs::read_dir(path)?;
         Ok(Self { path: path.to_owned() })
     }
 
     /// Returns the chunks that have a part in the folder.
-    ///
-    /// # Errors
-    /// Returns the file system's errors.
     pub fn chunks(&self) -> io::Result<BTreeSet<u64>> {
         let mut chunks = BTreeSet::new();
         for entry in fs::read_dir(&self.path)? {
@@ -54,17 +45,11 @@ impl PartFolder {
     }
 
     /// Reads the bytes of a part.
-    ///
-    /// # Errors
-    /// Returns the file system's errors.
     pub fn read(&self, chunk: u64) -> io::Result<Vec<u8>> {
         fs::read(self.file(chunk))
     }
 
     /// Writes a part atomically: after a crash its file is complete or absent.
-    ///
-    /// # Errors
-    /// Returns the file system's errors.
     pub fn write(&self, chunk: u64, bytes: &[u8]) -> io::Result<()> {
         let (mut file, temporary) = self.temporary(chunk)?;
         let written = file

@@ -82,29 +82,22 @@ pub struct Quantity {
     pub source: Source,
     /// Paths of a design that it may depend on. Other fields do not change it.
     #[serde(skip)]
-    #[schema(ignore)]
     pub(crate) depends_on: &'static [&'static str],
     /// Path of a design that sets it directly, if the field is given.
     #[serde(skip)]
-    #[schema(ignore)]
     pub(crate) said_by: Option<&'static str>,
     /// Lower bound for every drive.
     #[serde(skip)]
-    #[schema(ignore)]
     pub(crate) least: f64,
     /// Upper bound for every drive.
     #[serde(skip)]
-    #[schema(ignore)]
     pub(crate) most: f64,
     /// True if some drives have no such value.
     #[serde(skip)]
-    #[schema(ignore)]
     pub(crate) may_be_absent: bool,
     #[serde(skip)]
-    #[schema(ignore)]
     pub(crate) takes: Takes,
     #[serde(skip)]
-    #[schema(ignore)]
     of: Of,
 }
 

@@ -18,11 +18,9 @@ pub struct QuantileAnswer {
     pub value: f64,
     /// Lower confidence bound (97.5 %). Absent if the sample is too small.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub low: Option<f64>,
     /// Upper confidence bound (97.5 %). Absent if the sample is too small.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub high: Option<f64>,
 }
 

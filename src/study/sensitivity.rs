@@ -90,9 +90,8 @@ fn inputs_by_default(base: &Tree) -> Result<(Tree, BTreeMap<String, InputDocumen
     let complete = complete(base)?;
     let (mut base, mut inputs) = (base.clone(), BTreeMap::new());
     for name in ["drive", "materials", "load"] {
-        let part = [name.to_owned()];
-        if let Some(tree) = complete.at(&part) {
-            base.set(&part, tree.clone());
+        if let Some(tree) = complete.at(&[name]) {
+            base.set(&[name], tree.clone());
             numbers(tree, &format!("/{name}"), &mut inputs);
         }
     }
@@ -232,18 +231,15 @@ pub struct SensitivityToInput {
     pub plus_minus: f64,
     /// The quantity with the input decreased. Absent if that variant has no answer.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub at_minus: Option<f64>,
     /// The quantity with the input increased. Absent if that variant has no answer.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub at_plus: Option<f64>,
     /// Largest change in either direction, or 0 if both variants have no answer.
     pub change: f64,
     /// Central difference quotient. Absent if one variant has no answer, or if the two one-sided differences differ by
     /// more than 10 % (a kink, a jump or curvature).
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub derivative: Option<f64>,
     /// True if both one-sided differences agree, so that there is a derivative.
     pub is_smooth: bool,

@@ -113,9 +113,6 @@ impl Part {
 
 impl Study {
     /// Reads a study document and checks it.
-    ///
-    /// # Errors
-    /// Fails if the study is known to be impossible before it is computed. The error names the field.
     pub fn read(text: &[u8], limits: &Limits) -> Result<Self, NoAnswer> {
         let document = {
             // The tree is dropped before the study is made.
@@ -127,9 +124,6 @@ impl Study {
     }
 
     /// Checks a study document.
-    ///
-    /// # Errors
-    /// The same as [`Self::read`].
     pub fn new(document: &StudyDocument, limits: &Limits) -> Result<Self, NoAnswer> {
         let limited;
         let document = if let StudyDocument::Search(search) = document {

@@ -53,10 +53,8 @@ fn too_many_forms(list: &str) -> NoAnswer {
 }
 
 impl Template {
-    /// Makes the documents of a base with these free fields. `list` is their name in the study document.
-    ///
-    /// # Errors
-    /// Fails if a document is invalid for all values, if a range is empty, or if no document has a free field.
+    /// Makes the documents of a base with these free fields. `list` is their name in the study document. Fails if a
+    /// document is invalid for all values, if a range is empty, or if no document has a free field.
     pub(crate) fn new(base: &Tree, free: &[(String, Asked)], list: &'static str) -> Result<Self, NoAnswer> {
         let at = |pointer: &str| format!("/{list}/{}", escaped(pointer));
         let mut paths = Vec::new();
@@ -313,7 +311,7 @@ impl Template {
         let mut form = Form {
             tree: base.clone(),
             takes: vec![true; self.variables.len()],
-            derives_ring_teeth: base.at(&RING_TEETH.map(String::from)).is_none()
+            derives_ring_teeth: base.at(&RING_TEETH).is_none()
                 && self.variables.iter().all(|variable| variable.path != RING_TEETH),
         };
         let mut rest = combination;
@@ -329,7 +327,7 @@ impl Template {
             form.tree.set(&variable.path, value);
         }
         form.derive();
-        if base.at(&LAW.map(String::from)[..2]).is_none() {
+        if base.at(&LAW[..2]).is_none() {
             form.name_law_of_numbers();
         }
         let mut left_out = 0;

@@ -1,6 +1,7 @@
 //! Tests of design documents and their answers.
 #![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
 
+mod columns;
 mod contradictions;
 mod defaults;
 mod documents;

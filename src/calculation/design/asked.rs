@@ -15,15 +15,14 @@ use super::strength::StrengthDocument;
 pub struct SweepDocument {
     /// Number of equal intervals of one period; both ends are included. Default: 50, if `tolerance` is not given
     /// either.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, default = 50, required = false)]
     pub samples: Option<Whole>,
     /// Relative tolerance of the extremes of every force and stress, of wind-up, torsional stiffness and torque
     /// capacity. Use it instead of `samples`. Positions and half-widths are accurate to its square root, the
     /// transmission error to the tolerance times the wind-up. Input angles are placed where they are needed. The angle
     /// at which a tooth enters is listed twice, without and with that tooth.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
     /// True if the answer includes wind-up, torsional stiffness and backlash. Default: false.
     pub wind_up: bool,
@@ -109,7 +108,7 @@ impl PartsDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct WaveGeneratorPartDocument {
     /// Radius of its bore, in mm. Null or left out: no bore.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "crate::json::or_null")]
     pub bore_radius_mm: Option<f64>,
     /// Inward offset of the cam, in µm. Default: 0 µm.
     #[serde(default)]
@@ -131,15 +130,13 @@ pub struct ToothPartDocument {
 pub struct RingPartDocument {
     /// Outer radius, in mm. Default: 1.2 times the largest radius of the tooth spaces. This is the root radius, unless
     /// a tip relief extends beyond it.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub outer_radius_mm: Option<f64>,
     /// Outward offset of the flank, in µm. A bored tip keeps its radius. Default: 0 µm.
     pub clearance_um: f64,
     /// Support of the ring's rim. A sweep estimates the compliance from it; drawings do not use it. Default: a rigid
     /// housing.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub rim: Option<Rim>,
 }
 
@@ -149,30 +146,25 @@ pub struct RingPartDocument {
 pub struct CarrierPartDocument {
     /// Inner radius, in mm. Default: one tenth of the annulus between cam and ring tips stays free inside. Slot walls
     /// support flat-sided teeth from this radius on.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub inner_radius_mm: Option<f64>,
     /// Outer radius, in mm. Default: one tenth of that annulus stays free outside. Slot walls support flat-sided teeth
     /// up to this radius.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub outer_radius_mm: Option<f64>,
     /// Offset of each wall of a slot, in µm. Default: 0 µm.
     pub clearance_um: f64,
     /// Support of the fingers between the slots. A sweep calculates compliance and strength from it. If they are held at
     /// one end or in the middle, contact stresses are those at the place where the load along a tooth is largest.
     /// Default: a disc at one end, and a ring that joins the far ends.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub fingers: Option<Fingers>,
     /// Radius of the fillet at the foot of a finger, in mm. Default: a tenth of the finger's thickness.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub finger_fillet_radius_mm: Option<f64>,
     /// Strength of the carrier's material: a name from `GET /v1/materials`, or numbers. With it a sweep calculates the
     /// safety of the fingers, which also limits the torque capacity. Default: no safety.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub strength: Option<StrengthDocument>,
 }
 

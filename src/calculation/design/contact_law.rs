@@ -5,21 +5,22 @@ use toothwave_solver::{ContactLaw, Parameter, PerContact};
 use utoipa::ToSchema;
 
 use super::drive::LengthsByContactDocument;
-use crate::union::union;
+use crate::union;
 
 union! {
     /// The contact law.
-    pub enum StiffnessDocument as "Stiffness" by "law" read "by:law" {
+    #[schema(as = Stiffness)]
+    pub enum StiffnessDocument by "law" read "by:law" {
         /// The paper's stiffness k = (π/2) L1 E* at each contact.
-        Linear(LinearDocument) = "linear",
+        Linear(LinearDocument),
         /// Given stiffnesses.
-        Fixed(FixedDocument) = "fixed",
+        Fixed(FixedDocument),
         /// Palmgren's law for steel cylinders.
-        Palmgren(PalmgrenDocument) = "palmgren",
+        Palmgren(PalmgrenDocument),
         /// Johnson's law for line contacts.
-        Johnson(JohnsonDocument) = "johnson",
+        Johnson(JohnsonDocument),
         /// Hertz's law for balls.
-        Hertz(HertzDocument) = "hertz",
+        Hertz(HertzDocument),
     }
 }
 

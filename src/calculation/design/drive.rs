@@ -5,7 +5,7 @@ use toothwave_solver::{PerContact, ToothShape, WaveGenerator};
 use utoipa::ToSchema;
 
 use super::number::Whole;
-use crate::union::union;
+use crate::union;
 
 /// Wave generator, teeth and ring.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -21,15 +21,16 @@ pub struct DriveDocument {
 
 union! {
     /// Cam with one or more lobes, which pushes the teeth outward. Default kind: ellipse.
-    pub enum WaveGeneratorDocument as "WaveGenerator" by "kind" read "by:kind=ellipse" default "ellipse" {
+    #[schema(as = WaveGenerator)]
+    pub enum WaveGeneratorDocument by "kind" read "by:kind=ellipse" {
         /// An ellipse.
-        Ellipse(EllipseDocument) = "ellipse",
+        Ellipse(EllipseDocument),
         /// A circle that rotates about a point off its centre.
-        Eccentric(EccentricDocument) = "eccentric",
+        Eccentric(EccentricDocument),
         /// A support function with one harmonic.
-        Harmonic(HarmonicDocument) = "harmonic",
+        Harmonic(HarmonicDocument),
         /// A path of the tooth centres with one harmonic.
-        HarmonicPath(HarmonicPathDocument) = "harmonic_path",
+        HarmonicPath(HarmonicPathDocument),
     }
 }
 
@@ -81,13 +82,14 @@ pub struct HarmonicPathDocument {
 
 union! {
     /// The discrete teeth. Default shape: cylinder.
-    pub enum TeethDocument as "Teeth" by "shape" read "by:shape=cylinder" default "cylinder" {
+    #[schema(as = Teeth)]
+    pub enum TeethDocument by "shape" read "by:shape=cylinder" {
         /// Cylinders along the axis.
-        Cylinder(CylinderDocument) = "cylinder",
+        Cylinder(CylinderDocument),
         /// Balls.
-        Ball(BallDocument) = "ball",
+        Ball(BallDocument),
         /// Cylinders with two flats.
-        FlatSided(FlatSidedDocument) = "flat_sided",
+        FlatSided(FlatSidedDocument),
     }
 }
 
@@ -99,7 +101,7 @@ pub struct CylinderDocument {
     #[schema(value_type = i64)]
     pub count: Whole,
     /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a tooth, in mm.
@@ -116,7 +118,7 @@ pub struct BallDocument {
     #[schema(value_type = i64)]
     pub count: Whole,
     /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a ball, in mm.
@@ -135,7 +137,7 @@ pub struct FlatSidedDocument {
     #[schema(value_type = i64)]
     pub count: Whole,
     /// Number of installed teeth Z'_G, a divisor of `count`. Only installed teeth have a slot. Default: `count`.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = i64, required = false)]
     pub installed: Option<Whole>,
     /// Radius r of a tooth, in mm.
@@ -151,16 +153,13 @@ pub struct FlatSidedDocument {
 #[serde(deny_unknown_fields, default, expecting = "an object")]
 pub struct LengthsByContactDocument {
     /// At the wave generator, in mm.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub wave_generator: Option<f64>,
     /// At the ring, in mm.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub ring: Option<f64>,
     /// At the carrier, in mm.
-    #[serde(deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub carrier: Option<f64>,
 }
 
@@ -253,6 +252,6 @@ pub struct RingDocument {
     #[schema(value_type = i64)]
     pub teeth: Whole,
     /// Radius of a bore that truncates the teeth, in mm. Null or left out: the ring keeps its natural tip.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "crate::json::or_null")]
     pub tip_radius_mm: Option<f64>,
 }

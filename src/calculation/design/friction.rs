@@ -7,7 +7,7 @@ use toothwave_solver::losses::{Friction, FrictionParameters, RaceBearing, WaveGe
 use toothwave_solver::{Contact, Parameter, PerContact, Violation};
 use utoipa::ToSchema;
 
-use crate::union::union;
+use crate::union;
 
 /// Coulomb friction at each contact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -20,8 +20,7 @@ pub struct FrictionDocument {
     /// Friction between teeth and carrier.
     pub carrier: CoefficientDocument,
     /// Wear rates of the parts for Archard's law, in mm³/(N·m). If all are 0, as by default, wear is not calculated.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub wear_rate_mm3_per_nm: Option<WearRatesDocument>,
 }
 
@@ -47,14 +46,15 @@ pub struct CoefficientDocument {
 
 union! {
     /// Surface on which the teeth run at the wave generator.
-    pub enum WaveGeneratorFrictionDocument as "WaveGeneratorFriction" by "kind" read "by:kind" {
+    #[schema(as = WaveGeneratorFriction)]
+    pub enum WaveGeneratorFrictionDocument by "kind" read "by:kind" {
         /// The cam itself: the teeth slide on it.
-        Plain(CoefficientDocument) = "plain",
+        Plain(CoefficientDocument),
         /// A race around the cam that rotates freely: a thin bearing, or the bearing that is the eccentric.
-        Race(RaceDocument) = "race",
+        Race(RaceDocument),
         /// A race that is at rest relative to the carrier and does not slide on the teeth: the limit of a light
         /// bearing.
-        Rolling(RollingDocument) = "rolling",
+        Rolling(RollingDocument),
     }
 }
 
@@ -70,8 +70,7 @@ pub struct RaceDocument {
     pub bearing_radius_mm: f64,
     /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
     /// circle. Default: no life is calculated.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub bearing_load_rating_n: Option<f64>,
     /// Rolling element of the bearing. Default: ball.
     #[serde(default)]
@@ -83,8 +82,7 @@ pub struct RaceDocument {
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct RollingDocument {
     /// Allowed as for `race`, but without effect: such a race does not slide on the teeth.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub coefficient: Option<f64>,
     /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
     pub bearing_coefficient: f64,
@@ -92,8 +90,7 @@ pub struct RollingDocument {
     pub bearing_radius_mm: f64,
     /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
     /// circle. Default: no life is calculated.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub bearing_load_rating_n: Option<f64>,
     /// Rolling element of the bearing. Default: ball.
     #[serde(default)]
@@ -101,10 +98,8 @@ pub struct RollingDocument {
 }
 
 impl FrictionDocument {
-    /// Returns the parameters of the losses.
-    ///
-    /// # Errors
-    /// Every value that is out of its range, and a rating of a bearing where the wave generator is no eccentric circle.
+    /// Returns the parameters of the losses. Fails also if a bearing has a rating and the wave generator is no
+    /// eccentric circle.
     pub(super) fn loss_parameters(&self, is_eccentric: bool) -> Result<LossParameters, Vec<Violation>> {
         let mut violations = self.violations_beside();
         if self.bearing_rating().is_some() && !is_eccentric {

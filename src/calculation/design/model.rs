@@ -1,17 +1,13 @@
 //! The model of load sharing.
 
-use std::borrow::Cow;
-
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{self, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 use toothwave_solver::{Compatibility, PerContact};
-use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
-use utoipa::openapi::{Ref, RefOr};
-use utoipa::{PartialSchema, ToSchema};
+use utoipa::ToSchema;
+use utoipa::openapi::schema::{ObjectBuilder, Type};
 
 use super::contact_law::StiffnessDocument;
 use super::refinements::RefinementsDocument;
+use crate::either;
 
 /// The model of load sharing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -22,8 +18,7 @@ pub struct ModelDocument {
     pub compatibility: Compatibility,
     /// The contact law; the object names its `law`. Without the object: `hertz` for balls, `linear` for other teeth with
     /// `projection`, otherwise `johnson`.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<StiffnessDocument>,
     /// Compliance of the supports, in series with each contact, in mm/N. Needs `virtual_work`. Default: 0 mm/N.
     #[serde(default)]
@@ -32,21 +27,21 @@ pub struct ModelDocument {
     #[serde(default)]
     pub refinements: RefinementsDocument,
     /// Use `refinements`. Overrides it for `ring_teeth_bend`.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, deprecated)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(deprecated)]
     pub ring_teeth_bend: Option<bool>,
     /// Use `refinements`. Overrides it for `wave_generator_moves`.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, deprecated)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(deprecated)]
     pub wave_generator_moves: Option<bool>,
     /// Use `refinements`. Overrides it for `corner_contact`.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, deprecated)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(deprecated)]
     pub corner_contact: Option<bool>,
     /// Use `clearance_um` of the `parts`. A gap at a contact is assigned to the part that the teeth touch there, unless
     /// `parts` already gives the same gap. A gap of 0 µm counts as left out.
-    #[serde(default, deserialize_with = "toothwave_solver::given", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, deprecated)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(deprecated)]
     pub clearance: Option<ClearanceDocument>,
 }
 
@@ -116,54 +111,14 @@ impl Serialize for SeriesComplianceDocument {
     }
 }
 
-/// Told apart by what stands there, so that a fault keeps its place.
-impl<'de> Deserialize<'de> for SeriesComplianceDocument {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct WordOrObject;
-
-        impl<'de> Visitor<'de> for WordOrObject {
-            type Value = SeriesComplianceDocument;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("`estimated`, or an object with a number for each contact")
-            }
-
-            fn visit_str<E: de::Error>(self, word: &str) -> Result<Self::Value, E> {
-                match word {
-                    ESTIMATED => Ok(SeriesComplianceDocument::Estimated),
-                    _ => Err(E::unknown_variant(word, &[ESTIMATED])),
-                }
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, fields: A) -> Result<Self::Value, A::Error> {
-                let deserializer = MapAccessDeserializer::new(fields);
-                CompliancesDocument::deserialize(deserializer).map(SeriesComplianceDocument::Given)
-            }
-        }
-
-        deserializer.deserialize_any(WordOrObject)
-    }
-}
-
-impl PartialSchema for SeriesComplianceDocument {
-    fn schema() -> RefOr<Schema> {
-        OneOfBuilder::new()
-            .description(Some(
-                "Compliance of the support at each contact: numbers, or `estimated` for those of \
-                 `series_compliance_estimates` whose parts are held so.",
-            ))
-            .item(ObjectBuilder::new().schema_type(Type::String).enum_values(Some([ESTIMATED])))
-            .item(Ref::from_schema_name(CompliancesDocument::name()))
-            .into()
-    }
-}
-
-impl ToSchema for SeriesComplianceDocument {
-    fn name() -> Cow<'static, str> {
-        Cow::Borrowed("SeriesCompliance")
-    }
-
-    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        schemas.push((CompliancesDocument::name().into(), CompliancesDocument::schema()));
-    }
+either! {
+    SeriesComplianceDocument as "SeriesCompliance" (
+        "Compliance of the support at each contact: numbers, or `estimated` for those of `series_compliance_estimates` whose parts are held so.",
+        ObjectBuilder::new().schema_type(Type::String).enum_values(Some([ESTIMATED]))
+    ) expects "`estimated`, or an object with a number for each contact":
+    visit_str(word: &str) => match word {
+        ESTIMATED => Ok(SeriesComplianceDocument::Estimated),
+        _ => Err(E::unknown_variant(word, &[ESTIMATED])),
+    },
+    CompliancesDocument => SeriesComplianceDocument::Given,
 }

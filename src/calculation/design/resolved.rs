@@ -3,7 +3,7 @@
 use serde::Serialize;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::violation::Modified;
-use toothwave_solver::{Compatibility, Deviations, Parameter, Part, PerContact, Violation, model_error};
+use toothwave_solver::{Compatibility, Deviations, Modification, Parameter, Part, PerContact, Violation, model_error};
 
 use super::{
     ClearanceDocument, Design, DriveDocument, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
@@ -31,59 +31,19 @@ impl ClearancesUm {
     }
 }
 
-/// A surface that is offset by a clearance and by a modification.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SetBackTwice {
-    /// Part with this surface.
-    pub part: Part,
-    /// The modification.
-    pub modified: Modified,
-    /// Offset by the clearance, in µm.
-    pub clearance_um: f64,
-    /// Offset by the modification, in µm.
-    pub modification_um: f64,
-}
+/// JSON pointer of the deprecated gaps.
+pub const DEPRECATED_CLEARANCE: &str = "/model/clearance";
 
-/// A deprecated field that a document uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DeprecatedField {
-    /// `model.clearance`.
-    Clearance,
-    /// `model.ring_teeth_bend`.
-    RingTeethBend,
-    /// `model.wave_generator_moves`.
-    WaveGeneratorMoves,
-    /// `model.corner_contact`.
-    CornerContact,
-}
-
-impl DeprecatedField {
-    /// Returns the JSON pointer of the field.
-    pub const fn pointer(self) -> &'static str {
-        match self {
-            Self::Clearance => "/model/clearance",
-            Self::RingTeethBend => "/model/ring_teeth_bend",
-            Self::WaveGeneratorMoves => "/model/wave_generator_moves",
-            Self::CornerContact => "/model/corner_contact",
-        }
-    }
-
-    /// Returns the field that replaces it.
-    pub const fn replacement(self) -> &'static str {
-        match self {
-            Self::Clearance => "parts.*.clearance_um",
-            Self::RingTeethBend | Self::WaveGeneratorMoves | Self::CornerContact => "model.refinements",
-        }
-    }
-}
+/// JSON pointers of the deprecated switches of refinements.
+pub const DEPRECATED_SWITCHES: [&str; 3] =
+    ["/model/ring_teeth_bend", "/model/wave_generator_moves", "/model/corner_contact"];
 
 impl Design {
-    /// Returns the deprecated fields that have an effect.
-    pub fn deprecated_fields(&self) -> Vec<DeprecatedField> {
-        let clearance = self.deprecated_gaps_um() != PerContact::default();
-        let mut fields: Vec<_> = clearance.then_some(DeprecatedField::Clearance).into_iter().collect();
-        fields.extend(self.model.switches().into_iter().filter_map(|(field, is_on)| is_on.map(|_| field)));
-        fields
+    /// Returns the JSON pointers of the deprecated fields that have an effect.
+    pub fn deprecated_fields(&self) -> Vec<&'static str> {
+        let clearance = (self.deprecated_gaps_um() != PerContact::default()).then_some(DEPRECATED_CLEARANCE);
+        let switches = self.model.switches().filter_map(|(pointer, is_on)| is_on.map(|_| pointer));
+        clearance.into_iter().chain(switches).collect()
     }
 
     /// Returns the gaps of `model.clearance`.
@@ -119,36 +79,24 @@ impl Design {
         clearances
     }
 
-    /// Returns the surfaces that are offset by two fields.
-    pub fn set_back_twice(&self) -> impl Iterator<Item = SetBackTwice> + use<> {
-        let (clearances, modification) = (self.clearances_um(), self.modification);
-        let PerContact { wave_generator, ring, carrier } = clearances.by_contact;
+    /// Returns the surfaces that are offset by two fields: a clearance and a modification, both in µm.
+    pub fn set_back_twice(&self) -> impl Iterator<Item = [(Parameter, f64); 2]> + use<> {
+        let ClearancesUm { by_contact: PerContact { wave_generator, ring, carrier }, teeth } = self.clearances_um();
+        let Modification { wave_generator_equidistant_um, tooth_radius_um, ring_equidistant_um, slot_wall_um, .. } =
+            self.modification;
         let pairs = [
-            (
-                Part::WaveGenerator,
-                wave_generator,
-                Modified::WaveGeneratorEquidistant,
-                modification.wave_generator_equidistant_um,
-            ),
-            (Part::Teeth, clearances.teeth, Modified::ToothRadius, modification.tooth_radius_um),
-            (Part::Ring, ring, Modified::RingEquidistant, modification.ring_equidistant_um),
-            (Part::Carrier, carrier, Modified::SlotWall, modification.slot_wall_um),
+            (Part::WaveGenerator, wave_generator, Modified::WaveGeneratorEquidistant, wave_generator_equidistant_um),
+            (Part::Teeth, teeth, Modified::ToothRadius, tooth_radius_um),
+            (Part::Ring, ring, Modified::RingEquidistant, ring_equidistant_um),
+            (Part::Carrier, carrier, Modified::SlotWall, slot_wall_um),
         ];
-        let twice = pairs
-            .into_iter()
-            .filter(|&(_, clearance_um, _, modification_um)| clearance_um != 0.0 && modification_um != 0.0);
-        twice.map(|(part, clearance_um, modified, modification_um)| SetBackTwice {
-            part,
-            modified,
-            clearance_um,
-            modification_um,
-        })
+        let fields = pairs.map(|(part, clearance_um, modified, modification_um)| {
+            [(Parameter::PartClearance(part), clearance_um), (Parameter::Modification(modified), modification_um)]
+        });
+        fields.into_iter().filter(|fields| fields.iter().all(|&(_, offset_um)| offset_um != 0.0))
     }
 
     /// Checks that `model.clearance` and `parts` do not give a contact different gaps.
-    ///
-    /// # Errors
-    /// The conflict, as a fault.
     pub fn require_one_clearance(&self) -> Result<(), Fault> {
         let of_parts = self.clearances_of_parts_um().gaps();
         for (contact, &gap_um) in self.deprecated_gaps_um().iter() {
@@ -167,13 +115,10 @@ impl Design {
     }
 
     /// Checks that deprecated switches do not conflict with `refinements` or `projection`.
-    ///
-    /// # Errors
-    /// The conflict, as a fault.
     pub fn require_one_choice_of_refinements(&self) -> Result<(), Fault> {
         let is_projection = self.model.compatibility == Compatibility::Projection;
         let is_chosen = self.model.refinements != RefinementsDocument::AUTO;
-        for (field, is_on) in self.model.switches() {
+        for (pointer, is_on) in self.model.switches() {
             let detail = match is_on {
                 Some(_) if is_chosen => {
                     "`refinements` says already which refinements the model has; leave out this field, which is deprecated"
@@ -181,8 +126,7 @@ impl Design {
                 Some(true) if is_projection => "`projection` takes no refinement; choose `virtual_work`",
                 _ => continue,
             };
-            let pointer = field.pointer().into();
-            return Err(Fault { pointer, code: FieldCode::ConflictingFields, detail: detail.into() });
+            return Err(Fault { pointer: pointer.into(), code: FieldCode::ConflictingFields, detail: detail.into() });
         }
         Ok(())
     }
@@ -323,7 +267,7 @@ impl Design {
         let mut model = self.model.clone();
         model.stiffness = Some(self.stiffness());
         model.clearance = self.clearance_in_key().cloned();
-        let has_switch = model.switches().iter().any(|(_, is_on)| is_on.is_some());
+        let has_switch = model.switches().any(|(_, is_on)| is_on.is_some());
         // Only refinements other than `auto` depend on the geometry.
         if model.refinements != RefinementsDocument::AUTO && !has_switch {
             let drive = Draft::new(&self.drive_parameters()).ok().and_then(|draft| draft.drive());
@@ -339,11 +283,8 @@ impl Design {
 }
 
 impl ModelDocument {
-    const fn switches(&self) -> [(DeprecatedField, Option<bool>); 3] {
-        [
-            (DeprecatedField::RingTeethBend, self.ring_teeth_bend),
-            (DeprecatedField::WaveGeneratorMoves, self.wave_generator_moves),
-            (DeprecatedField::CornerContact, self.corner_contact),
-        ]
+    /// Returns the deprecated switches, by JSON pointer.
+    fn switches(&self) -> impl Iterator<Item = (&'static str, Option<bool>)> + use<> {
+        DEPRECATED_SWITCHES.into_iter().zip([self.ring_teeth_bend, self.wave_generator_moves, self.corner_contact])
     }
 }

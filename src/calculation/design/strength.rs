@@ -1,16 +1,11 @@
 //! Strength of the carrier's material: a name, or numbers.
 
-use std::borrow::Cow;
-
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{MapAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Serialize, Serializer};
 use toothwave_solver::Parameter;
 use toothwave_solver::fingers::Strength;
-use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
-use utoipa::openapi::{Ref, RefOr};
-use utoipa::{PartialSchema, ToSchema};
+use utoipa::openapi::schema::{ObjectBuilder, Type};
 
+use crate::either;
 use crate::strengths::{STRENGTHS, StrengthPreset};
 
 /// Strength of the carrier's material: a name from `GET /v1/materials`, or numbers.
@@ -67,50 +62,14 @@ const NAMES: [&str; STRENGTHS.len()] = {
     names
 };
 
-/// Distinguishes name and object by the JSON type, so that an error keeps its location.
-impl<'de> Deserialize<'de> for StrengthDocument {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NameOrObject;
-
-        impl<'de> Visitor<'de> for NameOrObject {
-            type Value = StrengthDocument;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("the name of a material, or an object with its strength")
-            }
-
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<Self::Value, E> {
-                const ALL: &[StrengthPreset] = &STRENGTHS;
-                let preset = ALL.iter().find(|preset| preset.name == name);
-                preset.map(StrengthDocument::Named).ok_or_else(|| E::unknown_variant(name, &NAMES))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, fields: A) -> Result<Self::Value, A::Error> {
-                let deserializer = MapAccessDeserializer::new(fields);
-                Strength::deserialize(deserializer).map(StrengthDocument::Given)
-            }
-        }
-
-        deserializer.deserialize_any(NameOrObject)
-    }
-}
-
-impl PartialSchema for StrengthDocument {
-    fn schema() -> RefOr<Schema> {
-        OneOfBuilder::new()
-            .description(Some("Strength of the carrier's material: a name from `GET /v1/materials`, or numbers."))
-            .item(ObjectBuilder::new().schema_type(Type::String).enum_values(Some(NAMES)))
-            .item(Ref::from_schema_name(Strength::name()))
-            .into()
-    }
-}
-
-impl ToSchema for StrengthDocument {
-    fn name() -> Cow<'static, str> {
-        Cow::Borrowed("Strength")
-    }
-
-    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        schemas.push((Strength::name().into(), Strength::schema()));
-    }
+either! {
+    StrengthDocument as "Strength" (
+        "Strength of the carrier's material: a name from `GET /v1/materials`, or numbers.",
+        ObjectBuilder::new().schema_type(Type::String).enum_values(Some(NAMES))
+    ) expects "the name of a material, or an object with its strength":
+    visit_str(name: &str) => {
+        let preset = STRENGTHS.iter().find(|preset| preset.name == name);
+        preset.map(Self::Value::Named).ok_or_else(|| E::unknown_variant(name, &NAMES))
+    },
+    Strength => StrengthDocument::Given,
 }

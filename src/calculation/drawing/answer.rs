@@ -54,7 +54,6 @@ pub struct DrawingAnswer {
     pub chord_tolerance_mm: f64,
     /// Angle of the wave generator, for an assembly only.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub input_angle_deg: Option<f64>,
     /// Drawn parts.
     pub bodies: Vec<BodyAnswer>,

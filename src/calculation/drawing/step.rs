@@ -18,21 +18,18 @@ use crate::json;
 const HASH_DIGITS: usize = 8;
 
 /// Writes a drawing.
-///
-/// # Errors
-/// The errors of the writer.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
-    let mut step = Step { writer, last: 0, shared: HashMap::new() };
+    let mut step = Step { writer, last: FRAME_RECORDS, shared: HashMap::new() };
     step.head(drawing)?;
-    let frame = step.frame()?;
+    let origin = step.placement([0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
     let hash = drawing.design_hash.get(..HASH_DIGITS).unwrap_or_default();
     let mut components = Vec::new();
     for body in &drawing.bodies {
-        components.push((body, step.part(body, hash, &frame)?));
+        components.push((body, step.part(body, hash, origin)?));
     }
     let stands_alone = matches!(&drawing.bodies[..], [body] if body.placements[..] == [PlacementAnswer::default()]);
     if !stands_alone {
-        step.assembly(&format!("{} {hash}", json::word(&drawing.subject)), &components, &frame)?;
+        step.assembly(&format!("{} {hash}", json::word(&drawing.subject)), &components, origin)?;
     }
     writeln!(step.writer, "ENDSEC;\nEND-ISO-10303-21;")
 }
@@ -51,13 +48,21 @@ impl std::fmt::Display for Id {
     }
 }
 
-/// Records that all products refer to.
-struct Frame {
-    product_context: Id,
-    definition_context: Id,
-    units: Id,
-    origin: Id,
-}
+/// Records that all products refer to, from #1.
+const FRAME: &str = "\
+#1=APPLICATION_CONTEXT('core data for automotive mechanical design processes');
+#2=APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,#1);
+#3=PRODUCT_CONTEXT('',#1,'mechanical');
+#4=PRODUCT_DEFINITION_CONTEXT('part definition',#1,'design');
+#5=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));
+#6=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));
+#7=(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT());
+#8=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),#5,'distance_accuracy_value','how near points are the same');
+#9=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#8))GLOBAL_UNIT_ASSIGNED_CONTEXT((#5,#6,#7))REPRESENTATION_CONTEXT('',''));";
+const FRAME_RECORDS: u64 = 9;
+const PRODUCT_CONTEXT: Id = Id(3);
+const DEFINITION_CONTEXT: Id = Id(4);
+const UNITS: Id = Id(9);
 
 /// Edge of the bottom of a prism: counter-clockwise around the material, which is on its left.
 enum Side {
@@ -128,35 +133,13 @@ impl Step<'_> {
         // The same design gives the same bytes at any time, so the date is constant.
         writeln!(
             self.writer,
-            "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(('{title}'),'2;1');\nFILE_NAME('{title}','1970-01-01T00:00:00',(''),(''),'toothwave {}','toothwave','');\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN {{ 1 0 10303 214 1 1 1 1 }}'));\nENDSEC;\nDATA;",
+            "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(('{title}'),'2;1');\nFILE_NAME('{title}','1970-01-01T00:00:00',(''),(''),'toothwave {}','toothwave','');\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN {{ 1 0 10303 214 1 1 1 1 }}'));\nENDSEC;\nDATA;\n{FRAME}",
             drawing.solver_version
         )
     }
 
-    fn frame(&mut self) -> io::Result<Frame> {
-        let application =
-            self.record(format_args!("APPLICATION_CONTEXT('core data for automotive mechanical design processes')"))?;
-        self.record(format_args!(
-            "APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,{application})"
-        ))?;
-        let product_context = self.record(format_args!("PRODUCT_CONTEXT('',{application},'mechanical')"))?;
-        let definition_context =
-            self.record(format_args!("PRODUCT_DEFINITION_CONTEXT('part definition',{application},'design')"))?;
-        let length = self.record(format_args!("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))"))?;
-        let angle = self.record(format_args!("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))"))?;
-        let solid_angle = self.record(format_args!("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())"))?;
-        let closeness = self.record(format_args!(
-            "UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-7),{length},'distance_accuracy_value','how near points are the same')"
-        ))?;
-        let units = self.record(format_args!(
-            "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({closeness}))GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{solid_angle}))REPRESENTATION_CONTEXT('',''))"
-        ))?;
-        let origin = self.placement([0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
-        Ok(Frame { product_context, definition_context, units, origin })
-    }
-
     /// Writes a part once, at its original position.
-    fn part(&mut self, body: &BodyAnswer, hash: &str, frame: &Frame) -> io::Result<Product> {
+    fn part(&mut self, body: &BodyAnswer, hash: &str, origin: Id) -> io::Result<Product> {
         let (name, [red, green, blue]) = match body.part {
             Part::WaveGenerator => ("wave_generator", [0.33, 0.62, 0.84]),
             Part::Teeth => ("tooth", [0.94, 0.95, 0.96]),
@@ -170,9 +153,8 @@ impl Step<'_> {
             }
             _ => self.prism(body, &name)?,
         };
-        let Frame { units, origin, .. } = frame;
         let representation =
-            self.record(format_args!("ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({origin},{solid}),{units})"))?;
+            self.record(format_args!("ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({origin},{solid}),{UNITS})"))?;
         let colour = self.record(format_args!("COLOUR_RGB('',{},{},{})", Real(red), Real(green), Real(blue)))?;
         let mut style = self.record(format_args!("FILL_AREA_STYLE_COLOUR('',{colour})"))?;
         for (kind, arguments) in
@@ -184,26 +166,24 @@ impl Step<'_> {
         let usage = self.record(format_args!("SURFACE_STYLE_USAGE(.BOTH.,{style})"))?;
         let assignment = self.record(format_args!("PRESENTATION_STYLE_ASSIGNMENT(({usage}))"))?;
         let styled = self.record(format_args!("STYLED_ITEM('colour',({assignment}),{solid})"))?;
-        self.record(format_args!("MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',({styled}),{units})"))?;
-        self.product(&name, representation, frame)
+        self.record(format_args!("MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',({styled}),{UNITS})"))?;
+        self.product(&name, representation)
     }
 
     /// Writes the records that name a shape.
-    fn product(&mut self, name: &str, representation: Id, frame: &Frame) -> io::Result<Product> {
-        let Frame { product_context, definition_context, .. } = frame;
-        let product = self.record(format_args!("PRODUCT('{name}','{name}','',({product_context}))"))?;
+    fn product(&mut self, name: &str, representation: Id) -> io::Result<Product> {
+        let product = self.record(format_args!("PRODUCT('{name}','{name}','',({PRODUCT_CONTEXT}))"))?;
         self.record(format_args!("PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))"))?;
         let formation = self.record(format_args!("PRODUCT_DEFINITION_FORMATION('','',{product})"))?;
         let definition =
-            self.record(format_args!("PRODUCT_DEFINITION('design','',{formation},{definition_context})"))?;
+            self.record(format_args!("PRODUCT_DEFINITION('design','',{formation},{DEFINITION_CONTEXT})"))?;
         let shape = self.record(format_args!("PRODUCT_DEFINITION_SHAPE('','',{definition})"))?;
         self.record(format_args!("SHAPE_DEFINITION_REPRESENTATION({shape},{representation})"))?;
         Ok(Product { definition, representation })
     }
 
     /// Writes the placed parts, with one instance for each placement.
-    fn assembly(&mut self, name: &str, components: &[(&BodyAnswer, Product)], frame: &Frame) -> io::Result<()> {
-        let Frame { units, origin, .. } = frame;
+    fn assembly(&mut self, name: &str, components: &[(&BodyAnswer, Product)], origin: Id) -> io::Result<()> {
         let mut places = Vec::new();
         for (body, _) in components {
             let mut of_body = Vec::new();
@@ -214,8 +194,8 @@ impl Step<'_> {
             places.push(of_body);
         }
         let items = list(&places.concat());
-        let representation = self.record(format_args!("SHAPE_REPRESENTATION('{name}',({origin},{items}),{units})"))?;
-        let whole = self.product(name, representation, frame)?;
+        let representation = self.record(format_args!("SHAPE_REPRESENTATION('{name}',({origin},{items}),{UNITS})"))?;
+        let whole = self.product(name, representation)?;
         for ((body, part), places) in components.iter().zip(places) {
             let part_name = json::word(&body.part);
             for (index, place) in places.into_iter().enumerate() {

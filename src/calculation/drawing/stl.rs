@@ -9,10 +9,7 @@ use super::svg;
 /// Bytes before the number of triangles. They may have any content except `solid`, which marks a text file.
 const HEAD_BYTES: usize = 80;
 
-/// Writes a drawing.
-///
-/// # Errors
-/// The errors of the writer, and an error for more triangles than STL can count.
+/// Writes a drawing. Fails for more triangles than STL can count.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let meshes: Vec<_> = drawing.bodies.iter().map(|body| Mesh::new(body, drawing.chord_tolerance_mm)).collect();
     let bodies = || drawing.bodies.iter().zip(&meshes);

@@ -10,9 +10,6 @@ use super::answer::{BodyAnswer, DrawingAnswer, EdgeAnswer, OutlineAnswer, Placem
 const MARGIN: f64 = 0.03;
 
 /// Writes a drawing.
-///
-/// # Errors
-/// The errors of the writer.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let reach_mm = reach_mm(&drawing.bodies) * (1.0 + MARGIN);
     let size_mm = 2.0 * reach_mm;

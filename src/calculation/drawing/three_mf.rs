@@ -21,9 +21,6 @@ const RELATIONSHIPS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 "#;
 
 /// Writes a drawing.
-///
-/// # Errors
-/// The errors of the writer and of the archive.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     // Files of an archive have a date. The default one is constant, so the same design gives the same bytes.

@@ -7,7 +7,8 @@ use super::tree::{ANY, Tree};
 use crate::field::FieldCode;
 
 impl Tree {
-    fn unexpected(&self) -> Unexpected<'_> {
+    /// Returns what stands here, for a message.
+    pub fn unexpected(&self) -> Unexpected<'_> {
         match self {
             Self::Null => Unexpected::Unit,
             Self::Bool(value) => Unexpected::Bool(*value),
@@ -34,11 +35,9 @@ impl<'de> serde::Deserializer<'de> for &Tree {
         }
     }
 
+    /// A field may be left out but not be null, except with [`or_null`](super::or_null).
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
-        match self {
-            Tree::Null => visitor.visit_none(),
-            _ => visitor.visit_some(self),
-        }
+        visitor.visit_some(self)
     }
 
     fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {

@@ -29,7 +29,7 @@ impl Fault {
 }
 
 /// Escapes a key for a JSON pointer (RFC 6901).
-pub(super) fn escaped(key: &str) -> String {
+pub fn escaped(key: &str) -> String {
     key.replace('~', "~0").replace('/', "~1")
 }
 

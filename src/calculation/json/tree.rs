@@ -126,28 +126,26 @@ impl<'de> Visitor<'de> for TreeVisitor {
 
 impl Tree {
     /// Deserializes the tree.
-    ///
-    /// # Errors
-    /// The first structural error.
     pub fn read<'de, T: Deserialize<'de>>(&self) -> Result<T, Fault> {
         T::deserialize(self)
     }
 
     /// Returns the value at a path of field names.
-    pub fn at(&self, path: &[String]) -> Option<&Self> {
+    pub fn at(&self, path: &[impl AsRef<str>]) -> Option<&Self> {
         path.iter().try_fold(self, |tree, name| match tree {
-            Self::Object(fields) => fields.iter().find(|(key, _)| key == name).map(|(_, value)| value),
-            Self::Array(items) => items.get(item(name)?),
+            Self::Object(fields) => fields.iter().find(|(key, _)| key == name.as_ref()).map(|(_, value)| value),
+            Self::Array(items) => items.get(item(name.as_ref())?),
             _ => None,
         })
     }
 
     /// Sets the value at a path. Missing objects on the path are created.
-    pub fn set(&mut self, path: &[String], value: Self) {
+    pub fn set(&mut self, path: &[impl AsRef<str>], value: Self) {
         let Some((name, rest)) = path.split_first() else {
             *self = value;
             return;
         };
+        let name = name.as_ref();
         if let Self::Array(items) = self
             && let Some(item) = item(name).and_then(|index| items.get_mut(index))
         {
@@ -159,17 +157,17 @@ impl Tree {
         }
         let Self::Object(fields) = self else { return };
         let index = fields.iter().position(|(key, _)| key == name).unwrap_or_else(|| {
-            fields.push((name.clone(), Self::Null));
+            fields.push((name.to_owned(), Self::Null));
             fields.len() - 1
         });
         fields[index].1.set(rest, value);
     }
 
     /// Removes the value at a path.
-    pub fn remove(&mut self, path: &[String]) -> Option<Self> {
+    pub fn remove(&mut self, path: &[impl AsRef<str>]) -> Option<Self> {
         let Self::Object(fields) = self else { return None };
         let (name, rest) = path.split_first()?;
-        let index = fields.iter().position(|(key, _)| key == name)?;
+        let index = fields.iter().position(|(key, _)| key == name.as_ref())?;
         if rest.is_empty() { Some(fields.remove(index).1) } else { fields[index].1.remove(rest) }
     }
 

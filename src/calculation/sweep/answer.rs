@@ -32,7 +32,6 @@ pub struct SweepAnswer {
     /// Input angle of the sweep, in deg, with `deviations`: the number of load periods after which all items are back
     /// in their positions.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub sweep_period_deg: Option<f64>,
     /// Load at both shafts, without losses.
     pub load: LoadAnswer,
@@ -50,28 +49,22 @@ pub struct SweepAnswer {
     pub states: StatesAnswer,
     /// Wind-up, torsional stiffness and backlash, with `sweep.wind_up`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub wind_up: Option<WindUpAnswer>,
     /// Torque capacity, with `load.allowable_stress_mpa`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub torque_capacity: Option<TorqueCapacity>,
     /// Strength of the carrier's fingers. Left out for balls, and for a carrier that cannot be made.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub fingers: Option<FingersAnswer>,
     /// Points of the duty, with `load.duty`. The other fields belong to the point with the largest torque.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub duty: Option<DutyAnswer>,
     /// Friction losses, with `friction`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub losses: Option<LossesAnswer>,
     /// Radial force of the teeth on the wave generator, in N. Left out if two or more lobes are loaded alike, because
     /// the forces then balance.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub radial_force_n: Option<RadialForceAnswer>,
     /// The complete model that was used. As `model` of the document it gives the same answer. Instead of deprecated
     /// switches it has `refinements`.
@@ -106,7 +99,6 @@ pub struct StatesAnswer {
     pub tooth: Vec<u32>,
     /// Lobe of the tooth. Only if zones are unlike, so that all of them are listed.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub lobe: Option<Vec<u32>>,
     /// Position ψ of the tooth, from the middle of its lobe (the major axis of an ellipse), in deg.
     pub position_deg: Vec<f64>,
@@ -132,7 +124,6 @@ pub struct StatesAnswer {
     pub stress_carrier_mpa: Vec<f64>,
     /// True if the tooth carries load. Only with gaps or `corner_contact`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub loaded: Option<Vec<bool>>,
 }
 
@@ -141,13 +132,11 @@ pub struct StatesAnswer {
 pub struct WindUpAnswer {
     /// Backlash at the output, without load. Absent if a tooth has no space on a lobe or in a valley.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub backlash: Option<BacklashAnswer>,
     /// Transmission error, peak to peak: range of the wind-up over the period, at the output, in deg.
     pub transmission_error_peak_to_peak_deg: f64,
     /// Transmission error without load, peak to peak, in deg. Only with gaps.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub unloaded_transmission_error_peak_to_peak_deg: Option<f64>,
     /// Input angle j, in deg.
     pub input_angle_deg: Vec<f64>,
@@ -155,7 +144,6 @@ pub struct WindUpAnswer {
     pub wind_up_deg: Vec<f64>,
     /// Wind-up without load, in deg: rotation until the first tooth has closed its gaps. Only with gaps.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub unloaded_wind_up_deg: Option<Vec<f64>>,
     /// Torsional stiffness, in N·m/rad: output torque over output rotation at the load, wave generator held.
     pub torsional_stiffness_nm_per_rad: Vec<f64>,

@@ -23,7 +23,6 @@ pub struct EstimateAnswer {
     /// Share that it adds to the approach of a tooth at its three contacts, for cylinders with this support under
     /// `johnson`. Left out if the design gives a series compliance there.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub share: Option<f64>,
 }
 

@@ -25,9 +25,6 @@ pub struct BacklashAnswer {
 
 impl CheckedSweep {
     /// Returns the backlash at the output.
-    ///
-    /// # Errors
-    /// As [`backlash::of`].
     pub fn backlash(&self, stop: &dyn Stop) -> Result<Backlash, SolveError> {
         backlash::of(&self.drive, self.load(), &self.deviations, stop)
     }

@@ -37,10 +37,8 @@ pub struct DutyPointAnswer {
     pub share_of_time: f64,
     /// Efficiency with the ring fixed, given `friction`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub efficiency_ring_fixed: Option<f64>,
     /// Power lost while this point runs, ring fixed, given `friction`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub power_loss_w: Option<f64>,
 }

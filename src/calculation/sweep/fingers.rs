@@ -36,15 +36,12 @@ pub struct FingersAnswer {
     pub stress_mpa: f64,
     /// The lesser of both safeties. Only with `parts.carrier.strength`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub safety: Option<f64>,
     /// Safety against yield, or against breaking if the material is hardened. Only with `parts.carrier.strength`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub yield_safety: Option<f64>,
     /// Safety against fatigue. Only with `parts.carrier.strength`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub fatigue_safety: Option<f64>,
 }
 

@@ -45,9 +45,6 @@ struct Pass {
 }
 
 /// Writes the plots.
-///
-/// # Errors
-/// Those of the writer.
 pub(super) fn write(sweep: &SweepAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let states = &sweep.states;
     let pass = Pass::of(sweep);

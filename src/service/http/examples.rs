@@ -15,7 +15,6 @@ pub struct Example {
     pub href: &'static str,
     /// The document.
     #[serde(skip)]
-    #[schema(ignore)]
     pub document: &'static str,
 }
 

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 use toothwave_calculation::schema_ranges::put_ranges;
+use toothwave_calculation::union::put_default_kinds;
 
 use super::problem::PROBLEM_JSON;
 
@@ -14,12 +15,12 @@ pub(crate) fn for_generators(document: &mut Value) {
         if let Some(media) = object.get_mut(PROBLEM_JSON) {
             *media = json!({ "schema": reference("Problem") });
         }
-        parameter_that_is_never_null(object);
-        no_null_by_default(object);
+        remove_null(object);
     });
     default_words_beside_their_words(document);
     join_variants(document);
     name_variants(document);
+    put_default_kinds(&mut document["components"]["schemas"]);
     put_ranges(document, &format!("{SCHEMAS}/Design"));
 }
 
@@ -34,13 +35,11 @@ fn join_variants(document: &mut Value) {
         let name = own.get("$ref").and_then(Value::as_str).and_then(|path| path.rsplit('/').next());
         let Some((name, object)) = name.and_then(|name| Some((name.to_owned(), fields.get(name)?))) else { continue };
         let mut object = object.clone();
-        if let (Some(properties), Some(words)) =
-            (object["properties"].as_object_mut(), word.get("properties").and_then(Value::as_object))
-        {
-            properties.extend(words.clone());
+        // A kind without fields has no properties.
+        for (tag, schema) in word["properties"].as_object().into_iter().flatten() {
+            object["properties"][tag] = schema.clone();
         }
-        let required = word.get("required").and_then(Value::as_array).into_iter().flatten();
-        let required = required.chain(object.get("required").and_then(Value::as_array).into_iter().flatten());
+        let required = [&word["required"], &object["required"]].into_iter().filter_map(Value::as_array).flatten();
         object["required"] = required.cloned().collect();
         *variant = object;
         joined.push(name);
@@ -49,24 +48,29 @@ fn join_variants(document: &mut Value) {
     schemas.retain(|name, _| !joined.contains(name) || text.contains(&format!("\"#{SCHEMAS}/{name}\"")));
 }
 
-/// Removes `null` from the types of parameters. A header or query is absent, never null.
-fn parameter_that_is_never_null(object: &mut Map<String, Value>) {
-    if object.contains_key("in")
-        && let Some(kind) = object.get_mut("schema").and_then(|schema| schema.get_mut("type"))
-        && let Some(types) = kind.as_array_mut()
-    {
-        types.retain(|name| name != "null");
-        if let [one] = &types[..] {
-            *kind = one.clone();
-        }
-    }
+/// Fields that may be null. All others, and parameters, are absent instead.
+const NULLABLE: [&str; 2] = ["tip_radius_mm", "bore_radius_mm"];
+
+/// Removes `null` from the fields of a schema or from a parameter.
+fn remove_null(object: &mut Map<String, Value>) {
+    let parameter = object.contains_key("in").then(|| object.get_mut("schema")).flatten();
+    parameter.into_iter().for_each(never_null);
+    let fields = object.get_mut("properties").and_then(Value::as_object_mut).into_iter().flatten();
+    fields.filter(|(name, _)| !NULLABLE.contains(&name.as_str())).for_each(|(_, schema)| never_null(schema));
 }
 
-/// Removes utoipa's default `null` from fields that may be absent but not null. Generators reject or send it.
-fn no_null_by_default(schema: &mut Map<String, Value>) {
-    let may_be_null = schema.get("type").and_then(Value::as_array).is_some_and(|types| types.contains(&json!("null")));
-    if schema.get("default") == Some(&Value::Null) && !may_be_null {
-        schema.remove("default");
+fn never_null(schema: &mut Value) {
+    let Some(schema) = schema.as_object_mut() else { return };
+    schema.retain(|name, value| name != "default" || !value.is_null());
+    for choices in ["type", "oneOf"] {
+        let Some(Value::Array(kinds)) = schema.get_mut(choices) else { continue };
+        kinds.retain(|kind| kind != "null" && *kind != json!({ "type": "null" }));
+        let Some(only) = (kinds.len() == 1).then(|| kinds.remove(0)) else { continue };
+        schema.remove(choices);
+        match only {
+            Value::Object(only) => schema.extend(only),
+            only => schema.extend([(choices.to_owned(), only)]),
+        }
     }
 }
 

@@ -55,11 +55,9 @@ pub struct StudyResource {
     pub events_href: String,
     /// Problem of a failed study.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub problem: Option<Problem>,
     /// Result, in the response to a `POST` after the study has ended.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub result: Option<StudyAnswer>,
 }
 

@@ -37,13 +37,11 @@ pub struct SearchAnswer {
     pub scan: ScanAnswer,
     /// If no design meets all limits: the design with the smallest sum of violations.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub nearest_miss: Option<FoundAnswer>,
     /// If no design meets all limits: for each limit that can be relaxed alone, the needed value.
     pub relaxations: Vec<RelaxationAnswer>,
     /// Names of the quantities in the order of the columns.
     #[serde(skip)]
-    #[schema(ignore)]
     quantities: Vec<&'static str>,
 }
 
@@ -54,15 +52,12 @@ pub struct FreeAnswer {
     pub pointer: String,
     /// Smallest value of a range.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub min: Option<f64>,
     /// Largest value of a range.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub max: Option<f64>,
     /// Number of values of a list.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub choices: Option<u64>,
 }
 

@@ -56,27 +56,22 @@ pub(super) fn asked_quantities(names: &[String], template: &Template) -> Result<
     all_named(names)
 }
 
-fn at<'a>(tree: &'a Tree, place: &[&str]) -> Option<&'a Tree> {
-    let place: Vec<_> = place.iter().map(|&name| name.to_owned()).collect();
-    tree.at(&place)
-}
-
 fn has_allowable_stress(tree: &Tree) -> bool {
-    at(tree, &["load", "allowable_stress_mpa"]).is_some()
+    tree.at(&["load", "allowable_stress_mpa"]).is_some()
 }
 
 fn has_carrier_strength(tree: &Tree) -> bool {
-    at(tree, &["load"]).and(at(tree, &["parts", "carrier", "strength"])).is_some()
+    tree.at(&["load"]).and(tree.at(&["parts", "carrier", "strength"])).is_some()
 }
 
 /// True if the document sets the speed of the wave generator. Every point of a duty does.
 fn has_speed(tree: &Tree) -> bool {
-    [["load", "input_speed_rpm"], ["load", "duty"]].iter().any(|place| at(tree, place).is_some())
+    [["load", "input_speed_rpm"], ["load", "duty"]].iter().any(|place| tree.at(place).is_some())
 }
 
 /// Returns the highest need that the document meets, without allowable stresses.
 fn what_it_has(tree: &Tree) -> Needs {
-    let has = |place: &[&str]| at(tree, place).is_some();
+    let has = |place: &[&str]| tree.at(place).is_some();
     match (has(&["load"]), has(&["friction"]), has_speed(tree)) {
         (false, ..) => Needs::Drive,
         (true, false, _) => Needs::Load,
@@ -105,7 +100,7 @@ pub(super) fn require_what_quantities_need(quantities: &[&'static Quantity], tre
                 (&["load", "input_speed_rpm"], "the speed of the wave generator"),
             ],
         };
-        if let Some((place, what)) = needed.iter().find(|(place, _)| at(tree, place).is_none()) {
+        if let Some((place, what)) = needed.iter().find(|(place, _)| tree.at(place).is_none()) {
             let detail = format!("`{}` needs {what}, but the base has none. Add it", quantity.name);
             return Err(fault(&format!("/base/{}", place.join("/")), FieldCode::MissingField, detail));
         }

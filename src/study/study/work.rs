@@ -35,10 +35,8 @@ impl Work {
         Self { study: Arc::clone(study), state }
     }
 
-    /// Computes one variant. Returns true if it was the last one.
-    ///
-    /// # Errors
-    /// If `stop` is set. The chunk is then the same as before.
+    /// Computes one variant. Returns true if it was the last one. If `stop` is set, it fails and the chunk stays the
+    /// same.
     pub fn step(&mut self, stop: &dyn Stop) -> Result<bool, Stopped> {
         let Self { study, state } = self;
         let evaluator = &study.evaluator;
@@ -61,9 +59,6 @@ impl Work {
     }
 
     /// Computes the whole chunk.
-    ///
-    /// # Errors
-    /// The same as [`Self::step`].
     pub fn run(mut self, stop: &dyn Stop) -> Result<Part, Stopped> {
         while !self.step(stop)? {}
         Ok(self.finish())

@@ -29,7 +29,6 @@ pub struct ToleranceAnswer {
     pub reasons: Vec<ReasonAnswer>,
     /// Fraction of all random drives that can be assembled and meet every limit. Absent without `require`.
     #[serde(rename = "yield", skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub yield_share: Option<ShareAnswer>,
     /// The limits, each with the number of drives that violate it.
     pub limits: Vec<ToleranceLimitAnswer>,
@@ -57,7 +56,6 @@ pub struct ToleranceQuantityAnswer {
     pub quantity: &'static str,
     /// Value without deviations. Absent if that drive has no answer.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub nominal: Option<f64>,
     /// Mean.
     pub mean: f64,

@@ -29,14 +29,11 @@ impl Form {
         if !self.derives_ring_teeth {
             return;
         }
-        let number = |place: &[&str]| {
-            let place: Vec<_> = place.iter().map(|&name| name.to_owned()).collect();
-            match self.tree.at(&place) {
-                Some(Tree::Number(number)) => Some(*number),
-                _ => None,
-            }
+        let number = |place: &[&str]| match self.tree.at(place) {
+            Some(Tree::Number(number)) => Some(*number),
+            _ => None,
         };
-        let kind = self.tree.at(&["drive", "wave_generator", "kind"].map(String::from));
+        let kind = self.tree.at(&["drive", "wave_generator", "kind"]);
         let lobes = match kind {
             Some(Tree::Text(kind)) if kind == "eccentric" => Some(1.0),
             Some(Tree::Text(kind)) if kind == "ellipse" => Some(2.0),
@@ -44,20 +41,19 @@ impl Form {
             None => Some(2.0),
         };
         if let (Some(lobes), Some(count)) = (lobes, number(&["drive", "teeth", "count"])) {
-            self.tree.set(&RING_TEETH.map(String::from), Tree::Number(count - lobes));
+            self.tree.set(&RING_TEETH, Tree::Number(count - lobes));
         }
     }
 
     /// Names the default law, if free fields are its numbers and nothing names the law.
     pub(super) fn name_law_of_numbers(&mut self) {
-        let law = LAW.map(String::from);
-        if self.tree.at(&law[..2]).is_none() || self.tree.at(&law).is_some() {
+        if self.tree.at(&LAW[..2]).is_none() || self.tree.at(&LAW).is_some() {
             return;
         }
         let mut without = self.tree.clone();
-        without.remove(&law[..2]);
-        if let Some(name) = complete(&without).ok().and_then(|complete| complete.at(&law).cloned()) {
-            self.tree.set(&law, name);
+        without.remove(&LAW[..2]);
+        if let Some(name) = complete(&without).ok().and_then(|complete| complete.at(&LAW).cloned()) {
+            self.tree.set(&LAW, name);
         }
     }
 

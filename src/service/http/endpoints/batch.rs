@@ -103,11 +103,9 @@ pub struct BatchLine<A> {
     pub status: u16,
     /// The answer of the endpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub answer: Option<A>,
     /// The problem, if there is no answer.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub problem: Option<Problem>,
 }
 
@@ -120,7 +118,6 @@ pub struct BatchEnd {
     pub answered: u64,
     /// The problem that ended the batch early.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub problem: Option<Problem>,
 }
 
@@ -160,16 +157,17 @@ type Line = (u64, Result<Bytes, Problem>);
 type Compute = Box<dyn FnOnce(Option<&Reservation>, &AtomicBool) -> Result<Vec<u8>, Problem> + Send>;
 
 /// Checks a document. Returns the upper bound of the answer's bytes, if it is known, and the computation.
-fn checked<Q: Question>(
+fn checked<Q: Question, A: Forms>(
     question: &Q,
     index: u64,
     document: &[u8],
     limits: &Limits,
+    view: fn(Q::Answer) -> A,
 ) -> Result<(Option<u64>, Compute), Problem> {
     let checked = question.check(&Design::read(document)?, limits)?;
     let bytes = Q::max_bytes(&checked, Format::Json);
     let compute = move |reservation: Option<&Reservation>, stop: &AtomicBool| {
-        let answer = Q::answer(&checked, stop)?;
+        let answer = view(Q::answer(&checked, stop)?);
         if let Some(reservation) = reservation {
             require_within(reservation, answer.bytes(Format::Json))?;
         }
@@ -181,10 +179,10 @@ fn checked<Q: Question>(
 impl BatchQuery {
     fn check(self, index: u64, document: &[u8], limits: &Limits) -> Result<(Option<u64>, Compute), Problem> {
         match self.endpoint {
-            BatchEndpoint::Geometry => checked(&Geometry, index, document, limits),
-            BatchEndpoint::CoincidenceDegree => checked(&CoincidenceDegree, index, document, limits),
-            BatchEndpoint::Sweep if self.peaks_only => checked(&PeaksOnly, index, document, limits),
-            BatchEndpoint::Sweep => checked(&Sweep, index, document, limits),
+            BatchEndpoint::Geometry => checked(&Geometry, index, document, limits, |answer| answer),
+            BatchEndpoint::CoincidenceDegree => checked(&CoincidenceDegree, index, document, limits, |answer| answer),
+            BatchEndpoint::Sweep if self.peaks_only => checked(&Sweep, index, document, limits, PeaksOnly),
+            BatchEndpoint::Sweep => checked(&Sweep, index, document, limits, |answer| answer),
         }
     }
 }

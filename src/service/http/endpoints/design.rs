@@ -24,15 +24,12 @@ use crate::http::problem::Problem;
 pub struct DesignAnswer {
     /// Answer of `/v1/geometry`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub geometry: Option<GeometryAnswer>,
     /// Answer of `/v1/coincidence-degree`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub coincidence_degree: Option<CoincidenceDegreeAnswer>,
     /// Answer of `/v1/sweep`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub sweep: Option<SweepAnswer>,
     /// Problems of the missing answers.
     pub problems: DesignProblems,
@@ -43,15 +40,12 @@ pub struct DesignAnswer {
 pub struct DesignProblems {
     /// Problem of the geometry.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub geometry: Option<Problem>,
     /// Problem of the contact ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub coincidence_degree: Option<Problem>,
     /// Problem of the sweep.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub sweep: Option<Problem>,
 }
 
