@@ -1,11 +1,9 @@
-//! Fields of the design document: their pointers, and their kinds of error.
+//! Errors of fields, and the ranges of their numbers.
 
 use serde::Serialize;
-use toothwave_solver::violation::{Listed, Misfit, Modified, OfDutyPoint, Range, Violation};
-use toothwave_solver::{Contact, Parameter};
+use toothwave_solver::Parameter;
+use toothwave_solver::violation::{Misfit, Modified, Range, Violation};
 use utoipa::ToSchema;
-
-use crate::json::word;
 
 /// Error of a field.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -139,7 +137,7 @@ impl From<&Violation> for FieldError {
             }
             Violation::ModificationLeavesNothing { modified, value, limit } => {
                 return FieldError {
-                    pointer: pointer(Parameter::Modification(modified)),
+                    pointer: Parameter::Modification(modified).to_string(),
                     code: FieldCode::ModificationLeavesNothing,
                     detail: violation.to_string(),
                     value: Some(value),
@@ -167,7 +165,7 @@ impl From<&Violation> for FieldError {
             }
         };
         FieldError {
-            pointer: pointer(parameter),
+            pointer: parameter.to_string(),
             code,
             detail: violation.to_string(),
             value: Some(value),
@@ -180,7 +178,7 @@ impl FieldError {
     /// Makes the error of a violation about a choice, which has no number.
     fn conflict(violation: &Violation, parameter: Parameter) -> Self {
         Self {
-            pointer: pointer(parameter),
+            pointer: parameter.to_string(),
             code: FieldCode::ConflictingFields,
             detail: violation.to_string(),
             value: None,
@@ -191,118 +189,6 @@ impl FieldError {
 
 /// Returns the pointer and the range of each number of the design document, of a list's entries those of the first.
 pub fn ranges() -> impl Iterator<Item = (String, Range)> {
-    let with_range = |parameter: Parameter| (pointer(parameter), parameter.range());
+    let with_range = |parameter: Parameter| (parameter.to_string(), parameter.range());
     Parameter::all().into_iter().map(with_range).filter(|(_, range)| range.low.is_finite())
-}
-
-/// Returns the JSON pointer of a parameter in the design document.
-pub fn pointer(parameter: Parameter) -> String {
-    match parameter {
-        Parameter::SemiMajor => "/drive/wave_generator/semi_major_mm".into(),
-        Parameter::SemiMinor => "/drive/wave_generator/semi_minor_mm".into(),
-        Parameter::EccentricRadius => "/drive/wave_generator/radius_mm".into(),
-        Parameter::Eccentricity => "/drive/wave_generator/eccentricity_mm".into(),
-        Parameter::Lobes | Parameter::HarmonicLobes => "/drive/wave_generator/lobes".into(),
-        Parameter::MeanRadius => "/drive/wave_generator/mean_radius_mm".into(),
-        Parameter::MeanPathRadius => "/drive/wave_generator/mean_path_radius_mm".into(),
-        Parameter::Amplitude => "/drive/wave_generator/amplitude_mm".into(),
-        Parameter::ToothCount => "/drive/teeth/count".into(),
-        Parameter::InstalledTeeth => "/drive/teeth/installed".into(),
-        Parameter::ToothRadius => "/drive/teeth/radius_mm".into(),
-        Parameter::ToothWidth => "/drive/teeth/width_mm".into(),
-        Parameter::GrooveRadius(contact) => format!("/drive/teeth/groove_radius_mm/{}", contact_name(contact)),
-        Parameter::FlatLength => "/drive/teeth/flat_length_mm".into(),
-        Parameter::RingTeeth => "/drive/ring/teeth".into(),
-        Parameter::TipRadius => "/drive/ring/tip_radius_mm".into(),
-        Parameter::YoungsModulus(part) => format!("/materials/{}/youngs_modulus_gpa", word(&part)),
-        Parameter::PoissonsRatio(part) => format!("/materials/{}/poissons_ratio", word(&part)),
-        Parameter::InputTorque => "/load/input_torque_nm".into(),
-        Parameter::OutputTorque => "/load/output_torque_nm".into(),
-        Parameter::Stiffness(contact) => format!("/model/stiffness/{}_n_per_mm", contact_name(contact)),
-        Parameter::Law => "/model/stiffness/law".into(),
-        Parameter::RingTeethBend | Parameter::WaveGeneratorMoves | Parameter::CornerContact => {
-            "/model/refinements".into()
-        }
-        Parameter::Depth(contact) => format!("/model/stiffness/depth_mm/{}", contact_name(contact)),
-        Parameter::SeriesCompliance(contact) => {
-            format!("/model/series_compliance_mm_per_n/{}", contact_name(contact))
-        }
-        Parameter::Clearance(contact) => format!("/model/clearance/{}_um", contact_name(contact)),
-        Parameter::Modification(modified) => format!("/modification/{}", modified_name(modified)),
-        Parameter::Deviations => "/deviations".into(),
-        Parameter::DeviationList(listed) => format!("/deviations/{}", listed_name(listed)),
-        Parameter::Deviation(listed, entry) => format!("/deviations/{}/{entry}", listed_name(listed)),
-        Parameter::RunoutAmount(contact) => format!("/deviations/{}_runout/amount_um", contact_name(contact)),
-        Parameter::RunoutAngle(contact) => format!("/deviations/{}_runout/angle_deg", contact_name(contact)),
-        Parameter::AllowableStress => "/load/allowable_stress_mpa".into(),
-        Parameter::AllowableStressAt(contact) => format!("/load/allowable_stress_mpa/{}", contact_name(contact)),
-        Parameter::InputSpeed => "/load/input_speed_rpm".into(),
-        Parameter::DutyPoints => "/load/duty".into(),
-        Parameter::Duty(of, at) => {
-            let name = match of {
-                OfDutyPoint::InputTorque => "input_torque_nm",
-                OfDutyPoint::OutputTorque => "output_torque_nm",
-                OfDutyPoint::InputSpeed => "input_speed_rpm",
-                OfDutyPoint::ShareOfTime => "share_of_time",
-            };
-            format!("/load/duty/{at}/{name}")
-        }
-        Parameter::FrictionCoefficient(contact) => format!("/friction/{}/coefficient", contact_name(contact)),
-        Parameter::BearingCoefficient => "/friction/wave_generator/bearing_coefficient".into(),
-        Parameter::BearingRadius => "/friction/wave_generator/bearing_radius_mm".into(),
-        Parameter::BearingLoadRating => "/friction/wave_generator/bearing_load_rating_n".into(),
-        Parameter::WearRate(contact) => format!("/friction/wear_rate_mm3_per_nm/{}", contact_name(contact)),
-        Parameter::Samples => "/sweep/samples".into(),
-        Parameter::RequestedError => "/accuracy/requested_error".into(),
-        Parameter::SweepTolerance => "/sweep/tolerance".into(),
-        Parameter::ChordTolerance => "/profile/chord_tolerance_mm".into(),
-        Parameter::RingOuterRadius => "/parts/ring/outer_radius_mm".into(),
-        Parameter::CarrierInnerRadius => "/parts/carrier/inner_radius_mm".into(),
-        Parameter::CarrierOuterRadius => "/parts/carrier/outer_radius_mm".into(),
-        Parameter::FingerFilletRadius => "/parts/carrier/finger_fillet_radius_mm".into(),
-        Parameter::YieldStrength => "/parts/carrier/strength/yield_strength_mpa".into(),
-        Parameter::TensileStrength => "/parts/carrier/strength/tensile_strength_mpa".into(),
-        Parameter::EnduranceLimit => "/parts/carrier/strength/endurance_limit_mpa".into(),
-        Parameter::BoreRadius => "/parts/wave_generator/bore_radius_mm".into(),
-        Parameter::PartClearance(part) => format!("/parts/{}/clearance_um", word(&part)),
-        Parameter::InputAngle => "/assembly/input_angle_deg".into(),
-    }
-}
-
-/// Returns the name of a modification in documents.
-const fn modified_name(modified: Modified) -> &'static str {
-    match modified {
-        Modified::RingEquidistant => "ring_equidistant_um",
-        Modified::RingPathShift => "ring_path_shift_um",
-        Modified::RingProfileShift => "ring_profile_shift_um",
-        Modified::RingRotation => "ring_rotation_arcsec",
-        Modified::WaveGeneratorEquidistant => "wave_generator_equidistant_um",
-        Modified::SlotWall => "slot_wall_um",
-        Modified::CarrierRotation => "carrier_rotation_arcsec",
-        Modified::ToothRadius => "tooth_radius_um",
-        Modified::TipReliefAmount => "ring_tip_relief/amount_um",
-        Modified::TipReliefStart => "ring_tip_relief/start_deg",
-        Modified::TipReliefPower => "ring_tip_relief/power",
-    }
-}
-
-/// Returns the name of a list of deviations in documents.
-const fn listed_name(listed: Listed) -> &'static str {
-    match listed {
-        Listed::ToothRadius => "tooth_radius_um",
-        Listed::SlotAngle => "slot_angle_arcsec",
-        Listed::SlotWall => "slot_wall_um",
-        Listed::RingSpace => "ring_space_um",
-        Listed::RingSpaceAngle => "ring_space_angle_arcsec",
-        Listed::WaveGeneratorLobe => "wave_generator_lobe_um",
-    }
-}
-
-/// Returns the name of a contact in documents.
-pub const fn contact_name(contact: Contact) -> &'static str {
-    match contact {
-        Contact::WaveGenerator => "wave_generator",
-        Contact::Ring => "ring",
-        Contact::Carrier => "carrier",
-    }
 }

@@ -11,7 +11,6 @@ use toothwave_solver::{Contact, Drive, Finding, Parameter, SolveError, ToothShap
 use utoipa::ToSchema;
 
 use crate::design::{DeprecatedField, Design, SetBackTwice};
-use crate::field::{contact_name, pointer};
 use crate::no_answer::NoAnswer;
 
 /// Finding about a drive that can exist. docs/reference/findings.md has the formula behind each code.
@@ -84,7 +83,7 @@ impl Text {
         let Finding { code, severity, value, limit, contact } = *finding;
         let is_grave = severity == Severity::Warning;
         let parameters = drive.parameters();
-        let shaping = parameters.wave_generator.size_and_shape().map(pointer);
+        let shaping = parameters.wave_generator.size_and_shape().map(|size| size.to_string());
         let [size, shape] = [0, 1].map(|at| shaping[at].as_str());
         let (lobe, rounder) = match parameters.wave_generator {
             WaveGenerator::Ellipse { .. } => ("the major axis", "the ellipse rounder"),
@@ -104,8 +103,8 @@ impl Text {
         let hold_both_ends =
             if causes.fingers == Fingers::HeldAtBothEnds { "" } else { "hold the fingers at both ends, " };
         let contact = contact.unwrap_or(Contact::WaveGenerator);
-        let (at, mate) = (contact_name(contact).replace('_', " "), format!("/materials/{}", contact_name(contact)));
-        let groove = pointer(Parameter::GrooveRadius(contact));
+        let (at, mate) = (contact.to_string().replace('_', " "), format!("/materials/{contact}"));
+        let groove = Parameter::GrooveRadius(contact).to_string();
         let starts_deg = drive.flank_limit().position.from_lobe_deg();
         match code {
             Code::Undercut => text(
@@ -407,7 +406,7 @@ impl FindingAnswer {
 
     /// Creates the finding that two fields set the same surface back.
     fn of_set_back_twice(SetBackTwice { part, modified, clearance_um, modification_um }: SetBackTwice) -> Self {
-        let pointers = [Parameter::PartClearance(part), Parameter::Modification(modified)].map(pointer);
+        let pointers = [Parameter::PartClearance(part), Parameter::Modification(modified)].map(|at| at.to_string());
         Self {
             code: FindingCode::SetBackTwice,
             severity: Severity::Info,
