@@ -233,6 +233,6 @@ impl Parameter {
     /// Returns the violation of the parameter's range by `value`, if there is one.
     pub fn check(self, value: f64) -> Option<Violation> {
         let limit = self.range().limit_exceeded_by(value)?;
-        Some(Violation::OutOfRange { parameter: self, value, limit })
+        Some(Violation::out_of_range(self, value, limit))
     }
 }
