@@ -10,8 +10,7 @@ use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question as _};
 use toothwave_calculation::sweep::{CheckedSweep, Sweep};
 use toothwave_solver::parts::{LEAST_WALL, RIM};
-use toothwave_solver::violation::{Misfit, Parameter, Violation};
-use toothwave_solver::{Drive, Part, SolveError, Stop};
+use toothwave_solver::{Drive, Parameter, Part, SolveError, Stop, Violation};
 use utoipa::ToSchema;
 
 use crate::quantity::{Loaded, OUTER_DIAMETER_MM, Quantity, Takes, Variant};
@@ -175,9 +174,7 @@ impl Evaluator {
         let out_of_range = Parameter::PartClearance(Part::Ring).check(parts.ring_clearance_um);
         let out_of_range = out_of_range
             .or_else(|| parts.ring_outer_radius_mm.and_then(|radius| Parameter::RingOuterRadius.check(radius)));
-        let misfit = Misfit::RingWithoutRim;
-        let without_rim = (value <= limit).then_some(Violation::PartDoesNotFit { misfit, value, limit });
-        match out_of_range.or(without_rim) {
+        match out_of_range.or_else(|| (value <= limit).then(|| Violation::ring_without_rim(value, limit))) {
             Some(violation) => Err(NoAnswer::impossible(&[violation])),
             None => Ok(value),
         }
