@@ -3,10 +3,10 @@
 use serde::Serialize;
 use toothwave_solver::backing::Backings;
 use toothwave_solver::drive::Draft;
-use toothwave_solver::{LoadCase, Parameter, SolveError, Violation, model_error};
+use toothwave_solver::{LoadCase, Parameter, Part, SolveError, Violation, model_error};
 pub use toothwave_solver::{Never, Stop};
 
-use crate::design::{Design, SeriesComplianceDocument};
+use crate::design::{Design, PartsDocument, SeriesComplianceDocument};
 use crate::forms::{Format, Forms};
 use crate::key::Key;
 use crate::no_answer::NoAnswer;
@@ -126,6 +126,29 @@ pub(crate) fn checked_load(
     violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
     violations.extend(draft.drive().and_then(|drive| parameters.modification.violation_in(&drive)));
     violations.extend(parameters.carrier_violations(draft));
+    for violation in violations_of_supports(design, draft)? {
+        if !violations.contains(&violation) {
+            violations.push(violation);
+        }
+    }
     violations.extend(parameters.deviation_violations(&design.drive_parameters(), &(&design.deviations).into()));
     Ok(load)
+}
+
+/// Returns the reasons why given radii leave nothing of a part whose compliance or strength the document asks for.
+fn violations_of_supports(design: &Design, draft: &Draft) -> Result<Vec<Violation>, NoAnswer> {
+    let PartsDocument { ring, carrier, .. } = &design.parts;
+    let is_estimated = design.model.series_compliance_mm_per_n == SeriesComplianceDocument::Estimated;
+    let has_carrier_radius = carrier.inner_radius_mm.or(carrier.outer_radius_mm).is_some();
+    let asked = [
+        (Part::Carrier, has_carrier_radius && (is_estimated || carrier.strength.is_some())),
+        (Part::Ring, ring.outer_radius_mm.is_some() && is_estimated),
+    ];
+    let parts = design.parts_parameters()?;
+    let found = asked.into_iter().filter(|(_, is_asked)| *is_asked).flat_map(|(part, _)| parts.violations(part, draft));
+    let is_of_radius = |violation: &Violation| {
+        use Parameter::{CarrierInnerRadius, CarrierOuterRadius, RingOuterRadius};
+        matches!(violation.parameter, CarrierInnerRadius | CarrierOuterRadius | RingOuterRadius)
+    };
+    Ok(found.filter(is_of_radius).collect())
 }

@@ -233,6 +233,26 @@ fn converted_document_gives_same_forces_undeprecated() {
     }
 }
 
+/// Otherwise a part that cannot be made would count as rigid, and its strength as unlimited.
+#[test]
+fn radii_that_leave_no_part_are_refused_where_it_counts() {
+    let estimated = json!({ "series_compliance_mm_per_n": "estimated" });
+    let swapped = json!({ "inner_radius_mm": 52.5, "outer_radius_mm": 51.5 });
+    let mut strong = swapped.clone();
+    strong["strength"] = json!("c45-n");
+    let thin = json!({ "ring": { "outer_radius_mm": 52.0 } });
+    for (changes, code) in [
+        (json!({ "model": estimated, "parts": { "carrier": swapped } }), FieldCode::CarrierWithoutWall),
+        (json!({ "parts": { "carrier": strong } }), FieldCode::CarrierWithoutWall),
+        (json!({ "model": estimated, "parts": thin }), FieldCode::RingWithoutRim),
+    ] {
+        assert_eq!(swept(&changes).unwrap_err().errors[0].code, code, "{changes}");
+    }
+    // Forces on rigid supports do not depend on these parts.
+    assert!(swept(&json!({ "parts": { "carrier": swapped } })).is_ok());
+    assert!(swept(&json!({ "parts": thin })).is_ok());
+}
+
 #[test]
 fn gaps_that_differ_by_rounding_are_equal() {
     let parts = |ring: f64| json!({ "ring": { "clearance_um": ring }, "teeth": { "clearance_um": 0.1 } });
