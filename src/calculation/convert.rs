@@ -5,7 +5,7 @@ use toothwave_solver::drive::Draft;
 use toothwave_solver::{Contact, SolveError, model_error};
 
 use crate::design::{DEPRECATED_SWITCHES, Design, RefinementsDocument};
-use crate::field::{FieldCode, contact_name};
+use crate::field::FieldCode;
 use crate::json::{self, Fault, Tree};
 use crate::no_answer::NoAnswer;
 
@@ -54,9 +54,9 @@ fn convert_design(tree: &mut Tree) -> Result<(), NoAnswer> {
 /// Gives the gaps of `model.clearance` to the parts that teeth touch there, unless the parts have them.
 fn move_clearance(tree: &mut Tree) {
     let teeth_um = number(tree, &["parts", "teeth", "clearance_um"]);
-    for contact in Contact::all().map(contact_name) {
+    for contact in Contact::all().map(|contact| contact.to_string()) {
         let gap_um = number(tree, &["model", "clearance", &format!("{contact}_um")]);
-        let part = ["parts", contact, "clearance_um"];
+        let part = ["parts", &contact, "clearance_um"];
         if gap_um != 0.0 && number(tree, &part) + teeth_um == 0.0 {
             tree.set(&part, Tree::Number(gap_um));
         }

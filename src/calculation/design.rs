@@ -177,21 +177,18 @@ impl Design {
     /// default `installed` are left out, because `count` has the same ones.
     pub fn as_written(&self, violations: &[Violation]) -> Vec<Violation> {
         let Counted { count, installed, .. } = self.drive.teeth.counted();
-        let as_written = |&violation: &Violation| match violation {
-            Violation::OutOfRange { parameter: Parameter::InstalledTeeth, .. } if installed.is_none() => None,
-            Violation::OutOfRange { parameter, limit, value } => {
-                let value = match parameter {
-                    Parameter::ToothCount => count.0,
-                    Parameter::InstalledTeeth => installed.unwrap_or(count).0,
-                    Parameter::RingTeeth => self.drive.ring.teeth.0,
-                    Parameter::Lobes | Parameter::HarmonicLobes => {
-                        self.drive.wave_generator.lobes().map_or(value, |lobes| lobes.0)
-                    }
-                    _ => value,
-                };
-                Some(Violation::OutOfRange { parameter, value, limit })
+        let as_written = |violation: &Violation| {
+            if violation.code != FieldCode::OutOfRange {
+                return Some(violation.clone());
             }
-            other => Some(other),
+            let written = match violation.parameter {
+                Parameter::ToothCount => Some(count),
+                Parameter::InstalledTeeth => Some(installed?),
+                Parameter::RingTeeth => Some(self.drive.ring.teeth),
+                Parameter::Lobes | Parameter::HarmonicLobes => self.drive.wave_generator.lobes(),
+                _ => None,
+            };
+            Some(Violation { value: written.map(|count| count.0).or(violation.value), ..violation.clone() })
         };
         violations.iter().filter_map(as_written).collect()
     }
@@ -234,7 +231,7 @@ impl Design {
     /// Returns what the document gives and its `projection` rejects.
     pub fn projection_violations(&self) -> Vec<Violation> {
         let found = LoadCase::new(&self.model_parameters(false)).err().into_iter().flatten();
-        found.filter(|violation| matches!(violation, Violation::NeedsVirtualWork { .. })).collect()
+        found.filter(|violation| violation.code == FieldCode::ConflictingFields).collect()
     }
 
     /// Returns the given radii of the carrier that supports flat-sided teeth. Forces on other teeth do not depend on
@@ -314,7 +311,10 @@ impl Design {
         }
         let sum: f64 = points.iter().map(|point| point.share_of_time).sum();
         if violations.is_empty() && (sum - 1.0).abs() > SHARES_TOLERANCE {
-            violations.push(Violation::DutyShares { sum });
+            let detail = format!(
+                "the shares of time add up to {sum:?}, not to 1: say for each point how much of the running time it takes"
+            );
+            violations.push(Violation::new(FieldCode::OutOfRange, Parameter::DutyPoints, sum, 1.0, detail));
         }
         Ok(violations)
     }

@@ -11,7 +11,6 @@ use toothwave_solver::{Contact, Drive, Finding, Parameter, SolveError, ToothShap
 use utoipa::ToSchema;
 
 use crate::design::{DEPRECATED_CLEARANCE, Design};
-use crate::field::{contact_name, pointer};
 use crate::no_answer::NoAnswer;
 
 /// Finding about a drive that can exist. docs/reference/findings.md has the formula behind each code.
@@ -89,7 +88,7 @@ impl Text {
         let Finding { code, severity, value, limit, contact } = *finding;
         let is_grave = severity == Severity::Warning;
         let parameters = drive.parameters();
-        let shaping = parameters.wave_generator.size_and_shape().map(pointer);
+        let shaping = parameters.wave_generator.size_and_shape().map(|size| size.to_string());
         let [size, shape] = [0, 1].map(|at| shaping[at].as_str());
         let (lobe, rounder) = match parameters.wave_generator {
             WaveGenerator::Ellipse { .. } => ("the major axis", "the ellipse rounder"),
@@ -109,8 +108,8 @@ impl Text {
         let hold_both_ends =
             if causes.fingers == Fingers::HeldAtBothEnds { "" } else { "hold the fingers at both ends, " };
         let contact = contact.unwrap_or(Contact::WaveGenerator);
-        let (place, mate) = (contact_name(contact).replace('_', " "), format!("/materials/{}", contact_name(contact)));
-        let groove = pointer(Parameter::GrooveRadius(contact));
+        let (place, mate) = (contact.to_string().replace('_', " "), format!("/materials/{contact}"));
+        let groove = Parameter::GrooveRadius(contact).to_string();
         let starts_deg = drive.flank_limit().position.from_lobe_deg();
         match code {
             Code::Undercut => at(&[RADIUS, size, shape], "mm").says(
@@ -315,7 +314,7 @@ impl FindingAnswer {
 
     /// Creates the finding that two fields set the same surface back.
     fn of_set_back_twice([(clearance, clearance_um), (modification, modification_um)]: [(Parameter, f64); 2]) -> Self {
-        let pointers = [clearance, modification].map(pointer);
+        let pointers = [clearance, modification].map(|at| at.to_string());
         Self {
             code: FindingCode::SetBackTwice,
             severity: Severity::Info,

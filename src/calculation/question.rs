@@ -107,16 +107,16 @@ pub(crate) fn checked_load(
     // The torques of a duty have their own fields.
     let of_duty = |violation: &Violation| {
         use Parameter::{InputTorque, OutputTorque};
-        duty.is_asked && matches!(violation, Violation::OutOfRange { parameter: InputTorque | OutputTorque, .. })
+        duty.is_asked && matches!(violation.parameter, InputTorque | OutputTorque)
     };
     let of_clearances = design.clearance_violations();
     // A gap is the sum of clearances, so the error is about one clearance or about their sum.
-    let as_clearance = |violation: Violation| match violation {
-        Violation::OutOfRange { parameter: Parameter::Clearance(contact), value, limit } => {
+    let as_clearance = |violation: Violation| match violation.parameter {
+        Parameter::Clearance(contact) => {
             let parameter = Parameter::PartClearance(contact.mate());
-            of_clearances.is_empty().then_some(Violation::OutOfRange { parameter, value, limit })
+            of_clearances.is_empty().then_some(Violation { parameter, ..violation })
         }
-        other => Some(other),
+        _ => Some(violation),
     };
     let load = LoadCase::new(&parameters)
         .map_err(|found| violations.extend(found.into_iter().filter(|found| !of_duty(found)).filter_map(as_clearance)))

@@ -24,6 +24,18 @@ impl Part {
     }
 }
 
+/// Writes the name in documents.
+impl std::fmt::Display for Part {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::WaveGenerator => "wave_generator",
+            Self::Teeth => "teeth",
+            Self::Ring => "ring",
+            Self::Carrier => "carrier",
+        })
+    }
+}
+
 /// A contact of a tooth with another part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
@@ -58,6 +70,13 @@ impl Contact {
             Self::Ring => "the ring",
             Self::Carrier => "the carrier",
         }
+    }
+}
+
+/// Writes the name in documents.
+impl std::fmt::Display for Contact {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.mate().fmt(f)
     }
 }
 

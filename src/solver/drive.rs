@@ -2,6 +2,7 @@
 
 mod draft;
 mod neighbours;
+mod tooth_counts;
 
 use neighbours::Neighbours;
 
@@ -9,7 +10,7 @@ use crate::cam::{ToothCenter, WaveGenerator};
 use crate::contact::PerContact;
 use crate::ring::{FlankLimit, RingFlank, RingTooth};
 use crate::root::NotConverged;
-use crate::violation::{Parameter, Violation};
+use crate::violation::{FieldCode, Parameter, Violation};
 
 pub use draft::Draft;
 
@@ -94,20 +95,24 @@ impl ToothShape {
                     let is_in_range = Parameter::GrooveRadius(contact).check(groove_radius_mm).is_none();
                     is_in_range && groove_radius_mm <= tooth_radius_mm
                 })
-                .map(|(contact, groove_radius_mm)| Violation::GrooveTooTight {
-                    contact,
-                    groove_radius_mm,
-                    tooth_radius_mm,
+                .map(|(contact, groove_radius_mm)| {
+                    let detail = format!(
+                        "a groove of {groove_radius_mm:?} mm radius is no wider than the balls in it: choose more than their radius of {tooth_radius_mm:?} mm"
+                    );
+                    let parameter = Parameter::GrooveRadius(contact);
+                    Violation::new(FieldCode::GrooveTooTight, parameter, groove_radius_mm, tooth_radius_mm, detail)
                 })
                 .collect(),
             Self::FlatSided { flat_length_mm, .. }
                 if Parameter::FlatLength.check(*flat_length_mm).is_none()
                     && *flat_length_mm >= 2.0 * tooth_radius_mm =>
             {
-                vec![Violation::FlatTooLong {
-                    flat_length_mm: *flat_length_mm,
-                    tooth_diameter_mm: 2.0 * tooth_radius_mm,
-                }]
+                let diameter_mm = 2.0 * tooth_radius_mm;
+                let detail = format!(
+                    "flats of {flat_length_mm:?} mm length leave nothing of a tooth: choose less than its diameter of {diameter_mm:?} mm"
+                );
+                let (code, parameter) = (FieldCode::FlatTooLong, Parameter::FlatLength);
+                vec![Violation::new(code, parameter, *flat_length_mm, diameter_mm, detail)]
             }
             Self::FlatSided { .. } => Vec::new(),
         }

@@ -8,7 +8,7 @@ use crate::contact::PerContact;
 use crate::drive::{Drive, DriveParameters};
 use crate::mesh::{Mesh, Place, greatest_common_divisor};
 use crate::ring::FlankPoint;
-use crate::violation::{Listed, Modified, Parameter, Violation};
+use crate::violation::{FieldCode, Listed, Modified, Parameter, Violation};
 
 pub(crate) const MM_PER_UM: f64 = 1e-3;
 pub(crate) const RAD_PER_ARCSEC: f64 = PI / 648_000.0;
@@ -114,7 +114,10 @@ impl Deviations {
                 && !list.is_empty()
                 && list.len() != items
             {
-                violations.push(Violation::DeviationCount { listed, count: list.len(), items });
+                let (count, parameter) = (list.len(), Parameter::DeviationList(listed));
+                let detail = format!("{count} entries for {items} items: give one for each, or none");
+                let code = FieldCode::WrongLength;
+                violations.push(Violation::new(code, parameter, count as f64, items as f64, detail));
             }
             let entries = list.iter().enumerate();
             violations.extend(entries.filter_map(|(entry, &value)| Parameter::Deviation(listed, entry).check(value)));
@@ -249,12 +252,14 @@ impl Modification {
     /// elsewhere.
     pub fn violation_in(&self, drive: &Drive) -> Option<Violation> {
         let start_deg = self.ring_tip_relief?.start_deg;
-        if Parameter::Modification(Modified::TipReliefStart).check(start_deg).is_some() {
+        let end_deg = drive.flank_limit().position.from_lobe_deg();
+        let parameter = Parameter::Modification(Modified::TipReliefStart);
+        if parameter.check(start_deg).is_some() || start_deg < end_deg {
             return None;
         }
-        let engagement_start_deg = drive.flank_limit().position.from_lobe_deg();
-        (start_deg >= engagement_start_deg)
-            .then_some(Violation::TipReliefBeyondFlank { start_deg, engagement_start_deg })
+        let detail =
+            format!("a tip relief from {start_deg:?} deg on relieves nothing: the flank ends at {end_deg:?} deg");
+        Some(Violation::new(FieldCode::OutOfRange, parameter, start_deg, end_deg, detail))
     }
 
     /// True if none of the values opens or closes a gap.

@@ -65,7 +65,7 @@
 //! | warnings, expected error of the model | [`findings`], [`model_error::of`] |
 //!
 //! Parameters are built with `..Default::default()`, so that a later field changes no caller. Enums are exhaustive, so
-//! that a match over violations, findings or errors shows what a later version adds.
+//! that a match over codes or errors shows what a later version adds.
 
 #[doc(hidden)]
 pub mod approach;
@@ -111,7 +111,7 @@ pub use gaps::{Deviations, Modification};
 pub use load_sharing::{Compatibility, LoadCase, LoadParameters, Torque};
 use mesh::Place;
 pub use position::Position;
-pub use violation::{Parameter, Violation};
+pub use violation::{FieldCode, Parameter, Violation};
 
 /// Version of this crate, which answers include because a later version may compute the last digits differently.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -11,7 +11,7 @@ use crate::contact::Part;
 use crate::drive::{Draft, Drive, DriveError};
 use crate::gaps::{MM_PER_UM, Modification};
 use crate::tooth_space::ToothSpace;
-use crate::violation::{Misfit, Modified, Parameter, Violation};
+use crate::violation::{FieldCode as Code, Modified, Parameter, Violation};
 
 /// Dimensions that the mechanics do not determine. A radius that is `None` takes its default.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -122,7 +122,8 @@ impl PartsParameters {
         {
             let as_made_mm = self.ring_space(draft).map(|space| space.outermost_radius_mm());
             let root_mm = as_made_mm.unwrap_or(a + (r + (r + clearance_mm)));
-            checks.above(Misfit::RingWithoutRim, outer_mm, root_mm * (1.0 + LEAST_WALL));
+            let limit_mm = root_mm * (1.0 + LEAST_WALL);
+            checks.require(outer_mm > limit_mm, || Violation::ring_without_rim(outer_mm, limit_mm));
         }
         if let Some(drive) = draft.drive() {
             checks.0.extend(self.modification.violation_in(&drive));
@@ -135,7 +136,12 @@ impl PartsParameters {
         let Some(clearance_mm) = clearance_mm else { return };
         if let Some(greatest_mm) = draft.greatest_set_back_mm {
             let greatest_um = greatest_mm / MM_PER_UM;
-            checks.below(Misfit::ClearanceTakesCam, self.wave_generator_clearance_um, greatest_um);
+            let parameter = Parameter::PartClearance(Part::WaveGenerator);
+            checks.below(Code::ClearanceTakesCam, parameter, self.wave_generator_clearance_um, greatest_um, |value, limit| {
+                format!(
+                    "set back by {value:?} µm the wave generator gets a cusp: choose less than its least radius of curvature, {limit:?} µm"
+                )
+            });
             if self.wave_generator_clearance_um < greatest_um {
                 let (modified, value) =
                     (Modified::WaveGeneratorEquidistant, self.modification.wave_generator_equidistant_um);
@@ -153,7 +159,12 @@ impl PartsParameters {
         let set_back_mm = clearance_mm + MM_PER_UM * self.modification.wave_generator_equidistant_um;
         let cam_mm = draft.cam_inner_mm.map(|inner_mm| inner_mm - set_back_mm).filter(|&cam_mm| cam_mm > 0.0);
         if let (Some(bore_mm), Some(cam_mm)) = (bore_mm, cam_mm) {
-            checks.below(Misfit::BoreTakesCam, bore_mm, cam_mm * (1.0 - LEAST_WALL));
+            let limit_mm = cam_mm * (1.0 - LEAST_WALL);
+            checks.below(Code::BoreTakesCam, Parameter::BoreRadius, bore_mm, limit_mm, |value, limit| {
+                format!(
+                    "a bore of {value:?} mm cuts the wave generator open: choose less than its least radius of {limit:?} mm"
+                )
+            });
         }
     }
 
@@ -173,7 +184,12 @@ impl PartsParameters {
         {
             let clearance_mm = clearance_mm + MM_PER_UM * self.modification.slot_wall_um;
             let half_spacing_rad = PI / installed as f64;
-            checks.above(Misfit::SlotsTakeCarrier, outer_mm, (wall_mm + clearance_mm) / half_spacing_rad.sin());
+            let limit_mm = (wall_mm + clearance_mm) / half_spacing_rad.sin();
+            checks.above(Code::SlotsTakeCarrier, Parameter::CarrierOuterRadius, outer_mm, limit_mm, |value, limit| {
+                format!(
+                    "up to {limit:?} mm from the axis the slots run into each other, which leaves nothing of a carrier of {value:?} mm outer radius: make the teeth thinner or install fewer"
+                )
+            });
         }
     }
 
@@ -193,7 +209,12 @@ impl PartsParameters {
         // A tooth is thinnest between its flats.
         if let (Some(_), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
             let half_width_um = half_width_mm / MM_PER_UM;
-            checks.below(Misfit::ClearanceTakesTooth, self.teeth_clearance_um, half_width_um);
+            let parameter = Parameter::PartClearance(Part::Teeth);
+            checks.below(Code::ClearanceTakesTooth, parameter, self.teeth_clearance_um, half_width_um, |value, limit| {
+                format!(
+                    "a clearance of {value:?} µm leaves nothing of the teeth: choose less than their radius of {limit:?} µm"
+                )
+            });
             let (value, left_um) = (self.modification.tooth_radius_um, half_width_um - self.teeth_clearance_um);
             checks.modification(value < left_um || left_um <= 0.0, Modified::ToothRadius, value, left_um);
         }
@@ -324,9 +345,7 @@ struct Checks(Vec<Violation>);
 
 impl Checks {
     fn in_range(&mut self, parameter: Parameter, value: f64) -> Option<f64> {
-        let violation = parameter.check(value);
-        self.0.extend(violation);
-        violation.is_none().then_some(value)
+        parameter.check(value).map(|violation| self.0.push(violation)).is_none().then_some(value)
     }
 
     fn clearance_mm(&mut self, part: Part, clearance_um: f64) -> Option<f64> {
@@ -355,14 +374,28 @@ impl Checks {
         let outer_mm = annulus.map(|annulus| annulus.carrier_outer_mm());
         let outer_mm = self.radius_mm(Parameter::CarrierOuterRadius, radii.outer_mm, outer_mm);
         if let (Some(inner_mm), Some(a)) = (inner_mm, cam_outer_mm) {
-            self.above(Misfit::CarrierMeetsCam, inner_mm, a + MM_PER_UM * set_forward_um.max(0.0));
+            let limit_mm = a + MM_PER_UM * set_forward_um.max(0.0);
+            self.above(Code::CarrierMeetsCam, Parameter::CarrierInnerRadius, inner_mm, limit_mm, |value, limit| {
+                format!(
+                    "a carrier of {value:?} mm inner radius meets the wave generator: choose more than its largest radius of {limit:?} mm"
+                )
+            });
         }
         if let Some(outer_mm) = outer_mm {
             if let Some(annulus) = annulus {
-                self.below(Misfit::CarrierMeetsRing, outer_mm, annulus.outer_mm.min(made_tip_mm));
+                let limit_mm = annulus.outer_mm.min(made_tip_mm);
+                self.below(Code::CarrierMeetsRing, Parameter::CarrierOuterRadius, outer_mm, limit_mm, |value, limit| {
+                    format!(
+                        "a carrier of {value:?} mm outer radius meets the ring: choose less than the ring's tip radius of {limit:?} mm"
+                    )
+                });
             }
             if let Some(inner_mm) = inner_mm {
-                self.above(Misfit::CarrierWithoutWall, outer_mm, inner_mm);
+                self.above(Code::CarrierWithoutWall, Parameter::CarrierOuterRadius, outer_mm, inner_mm, |value, limit| {
+                    format!(
+                        "an outer radius of {value:?} mm leaves the carrier no wall: choose more than its inner radius of {limit:?} mm"
+                    )
+                });
             }
         }
         outer_mm
@@ -370,22 +403,20 @@ impl Checks {
 
     /// Checks that a modification leaves some of its part.
     fn modification(&mut self, holds: bool, modified: Modified, value: f64, limit: f64) {
+        self.require(holds, || Violation::modification_leaves_nothing(modified, value, Some(limit)));
+    }
+
+    fn above(&mut self, code: Code, parameter: Parameter, value: f64, limit: f64, text: impl Fn(f64, f64) -> String) {
+        self.require(value > limit, || Violation::new(code, parameter, value, limit, text(value, limit)));
+    }
+
+    fn below(&mut self, code: Code, parameter: Parameter, value: f64, limit: f64, text: impl Fn(f64, f64) -> String) {
+        self.require(value < limit, || Violation::new(code, parameter, value, limit, text(value, limit)));
+    }
+
+    fn require(&mut self, holds: bool, violation: impl FnOnce() -> Violation) {
         if !holds {
-            self.0.push(Violation::ModificationLeavesNothing { modified, value, limit: Some(limit) });
-        }
-    }
-
-    fn above(&mut self, misfit: Misfit, value: f64, limit: f64) {
-        self.require(value > limit, misfit, value, limit);
-    }
-
-    fn below(&mut self, misfit: Misfit, value: f64, limit: f64) {
-        self.require(value < limit, misfit, value, limit);
-    }
-
-    fn require(&mut self, holds: bool, misfit: Misfit, value: f64, limit: f64) {
-        if !holds {
-            self.0.push(Violation::PartDoesNotFit { misfit, value, limit });
+            self.0.push(violation());
         }
     }
 }

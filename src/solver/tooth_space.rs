@@ -106,7 +106,7 @@ impl ToothSpace {
     /// A modification that leaves no flank, and [`NotConverged`] from the geometry.
     pub(crate) fn new(drive: &Drive, clearance_mm: f64, modification: &Modification) -> Result<Self, DriveError> {
         let leaves_nothing = |modified, value, limit| {
-            DriveError::Impossible(vec![Violation::ModificationLeavesNothing { modified, value, limit }])
+            DriveError::Impossible(vec![Violation::modification_leaves_nothing(modified, value, limit)])
         };
         let bore_mm = drive.parameters().tip_radius_mm;
         // The flank is outside the path, and its root outside the bore.

@@ -2,241 +2,136 @@
 
 mod parameter;
 
-use crate::contact::{Contact, Part};
-
 pub use parameter::{
     Listed, MAX_DUTY_POINTS, MAX_LOBES, MAX_SAMPLES, MAX_TEETH, Modified, OfDutyPoint, Parameter, Range,
     SHARES_TOLERANCE,
 };
 
-/// Nearest possible tooth numbers on either side of an impossible one.
+// With the kinds that only documents have, so that the API has one list.
+/// Kinds of field errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Alternatives {
-    /// Largest possible number below.
-    pub below: Option<i64>,
-    /// Least possible number above.
-    pub above: Option<i64>,
-}
-
-impl Alternatives {
-    /// Returns the divisors of `teeth` next to a number of installed teeth that does not divide it.
-    pub(crate) fn to_installed(installed: i64, teeth: i64) -> Self {
-        let is_divisor = |other: &i64| teeth % other == 0;
-        Self { below: (2..installed).rev().find(is_divisor), above: (installed + 1..=teeth).find(is_divisor) }
-    }
-
-    /// Returns the ring tooth numbers that differ from `teeth` by the lobes and are at least the number of lobes.
-    pub(crate) fn to_ring_beside(teeth: i64, lobes: i64) -> Self {
-        let possible = |ring: i64| {
-            let is_in_range = Parameter::RingTeeth.check(ring as f64).is_none();
-            (is_in_range && ring >= lobes).then_some(ring)
-        };
-        Self { below: possible(teeth - lobes), above: possible(teeth + lobes) }
-    }
-
-    /// Returns true if the count is one of the two.
-    pub(crate) fn contains(&self, count: i64) -> bool {
-        self.below == Some(count) || self.above == Some(count)
-    }
-
-    /// Returns the nearer number, the lower one if both are equally near. There is always one.
-    pub fn nearest_to(&self, count: i64) -> i64 {
-        let nearest = [self.below, self.above].into_iter().flatten().min_by_key(|other| (other - count).abs());
-        nearest.unwrap_or(count)
-    }
-}
-
-impl std::fmt::Display for Alternatives {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match (self.below, self.above) {
-            (Some(below), Some(above)) => write!(f, "{below} or {above}"),
-            (below, above) => below.or(above).map_or(Ok(()), |only| write!(f, "{only}")),
-        }
-    }
-}
-
-/// Reason why a drive, a load or a request is impossible. Its text says what to change.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Violation {
-    /// A value outside its range.
-    OutOfRange {
-        /// The parameter.
-        parameter: Parameter,
-        /// Value.
-        value: f64,
-        /// End of the range that the value exceeds.
-        limit: f64,
-    },
-    /// Ellipse with `a ≤ b`.
-    CamNotElongated {
-        /// `a`.
-        semi_major_mm: f64,
-        /// `b`.
-        semi_minor_mm: f64,
-    },
-    /// The cam is too small for its stroke: its lobes have cusps, their flanks meet, or the axis is outside.
-    CamTooSmall {
-        /// Parameter that sets the size of the cam.
-        parameter: Parameter,
-        /// Value.
-        radius_mm: f64,
-        /// Value that it has to exceed.
-        least_mm: f64,
-    },
-    /// Impossible tooth difference: `|Z_G - Z_K| ≠ U`, or `Z_K < U`.
-    ToothDifference {
-        /// `Z_G`.
-        teeth: i64,
-        /// `Z_K`.
-        ring_teeth: i64,
-        /// `U`.
-        lobes: i64,
-        /// Possible values of `Z_K`.
-        instead: Alternatives,
-    },
-    /// A groove that is no wider than its ball.
-    GrooveTooTight {
-        /// Contact of the groove.
-        contact: Contact,
-        /// The groove's radius.
-        groove_radius_mm: f64,
-        /// `r`.
-        tooth_radius_mm: f64,
-    },
-    /// A flat that leaves nothing of the tooth.
-    FlatTooLong {
-        /// `l`.
-        flat_length_mm: f64,
-        /// `2r`.
-        tooth_diameter_mm: f64,
-    },
-    /// `Z'_G` is not a divisor of `Z_G`.
-    InstalledNoDivisor {
-        /// `Z'_G`.
-        installed: i64,
-        /// `Z_G`.
-        teeth: i64,
-        /// Possible values of `Z'_G`.
-        instead: Alternatives,
-    },
-    /// Neighbouring installed teeth touch somewhere on their path.
-    TeethTouch {
-        /// `2r`.
-        tooth_diameter_mm: f64,
-        /// Least distance of two neighbouring centres on their path, for an ellipse the pair across the minor axis.
-        center_distance_mm: f64,
-        /// Radius at which teeth begin to touch. The path of thinner teeth is closer to the axis.
-        touching_radius_mm: f64,
-    },
-    /// The ring's tips reach the wave generator: no annulus is left for the carrier.
-    NoCarrierAnnulus {
-        /// Parameter that sets the wave generator's reach.
-        parameter: Parameter,
-        /// Value.
-        value_mm: f64,
-        /// Value that it has to stay below.
-        limit_mm: f64,
-        /// Largest distance of the wave generator from the axis, `a` for an ellipse.
-        cam_outer_mm: f64,
-        /// Actual tip radius of the ring.
-        tip_radius_mm: f64,
-    },
-    /// A clearance under `projection` that would load a tooth instead of unloading it.
-    ClearanceNotMonotone {
-        /// Contact of the clearance.
-        contact: Contact,
-        /// The clearance.
-        clearance_um: f64,
-    },
-    /// A parameter that `projection` does not support.
-    NeedsVirtualWork {
-        /// The parameter.
-        parameter: Parameter,
-    },
-    /// A tip relief that starts at the end of the flank or beyond it.
-    TipReliefBeyondFlank {
-        /// Start of the tip relief.
-        start_deg: f64,
-        /// End of the flank.
-        engagement_start_deg: f64,
-    },
-    /// A modification that leaves nothing of a part's outline.
-    ModificationLeavesNothing {
-        /// The value of the modification.
-        modified: Modified,
-        /// Value.
-        value: f64,
-        /// Limit of the value, if it is a single number.
-        limit: Option<f64>,
-    },
-    /// A list of deviations that is neither empty nor has one entry for each item.
-    DeviationCount {
-        /// The list.
-        listed: Listed,
-        /// Number of entries.
-        count: usize,
-        /// Number of items.
-        items: usize,
-    },
-    /// A contact law that does not apply to teeth of this shape.
-    LawOfOtherTeeth,
-    /// Shares of a duty that do not add up to one.
-    DutyShares {
-        /// Their sum.
-        sum: f64,
-    },
-    /// A load rating of a bearing whose load does not define a life.
-    NoBearingLife,
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
+pub enum FieldCode {
+    /// The field is unknown.
+    UnknownField,
+    /// A required field is missing.
+    MissingField,
+    /// The field is given twice.
+    DuplicateField,
+    /// The value has the wrong type.
+    WrongType,
+    /// The word is not a valid choice.
+    UnknownChoice,
+    /// The number is too large for a double.
+    NumberTooLarge,
+    /// Only one of two fields may be given.
+    ConflictingFields,
+    /// The value is out of its range.
+    OutOfRange,
+    /// The list must be empty or have one entry for each item.
+    WrongLength,
+    /// No free field changes a quantity that is an objective or violates its limit.
+    Unaffected,
+    /// The semi-major axis does not exceed the semi-minor axis.
+    CamNotElongated,
+    /// The wave generator is too small for its stroke.
+    CamTooSmall,
+    /// The numbers of teeth of carrier and ring do not differ by one for each lobe.
+    ToothDifference,
+    /// The number of installed teeth does not divide the theoretical number (`count`).
+    InstalledNoDivisor,
+    /// A groove is not wider than its ball.
+    GrooveTooTight,
+    /// The flat is as long as the tooth's diameter, or longer.
+    FlatTooLong,
+    /// Neighbouring teeth touch somewhere on their path.
+    TeethTouch,
+    /// The ring's tips reach the wave generator.
+    NoCarrierAnnulus,
     /// The bore removes the whole flank.
-    BoreLeavesNoFlank {
-        /// The bore.
-        tip_radius_mm: f64,
-        /// `d_l + r`.
-        root_radius_mm: f64,
-    },
-    /// A part whose dimension or clearance leaves no space for it or for another part.
-    PartDoesNotFit {
-        /// The misfit.
-        misfit: Misfit,
-        /// The value, given or by default, in the unit of its parameter.
-        value: f64,
-        /// Limit of the value, upper or lower.
-        limit: f64,
-    },
-}
-
-/// Reason why a part cannot be made or does not fit to the others.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Misfit {
-    /// The ring's outer radius does not exceed its root radius.
+    BoreLeavesNoFlank,
+    /// With `projection` this clearance would load a tooth instead of relieving it.
+    ClearanceNotMonotone,
+    /// The ring's outer radius does not exceed the largest radius of its tooth spaces, including the tip relief.
     RingWithoutRim,
-    /// The carrier's inner radius does not exceed that of the cam.
+    /// The carrier's inner radius does not exceed the cam's largest radius.
     CarrierMeetsCam,
     /// The carrier's outer radius reaches the ring's tips.
     CarrierMeetsRing,
-    /// The carrier's outer radius does not exceed its inner one.
+    /// The carrier's outer radius does not exceed its inner radius.
     CarrierWithoutWall,
     /// The slots overlap up to the carrier's outer radius.
     SlotsTakeCarrier,
-    /// The bore reaches the cam.
+    /// The wave generator's bore cuts through its outline.
     BoreTakesCam,
-    /// The cam's inward offset is at least its least radius of curvature.
+    /// The wave generator's clearance gives its outline a cusp.
     ClearanceTakesCam,
-    /// The teeth's clearance reaches their radius.
+    /// The teeth's clearance is as large as their radius, or larger.
     ClearanceTakesTooth,
+    /// The modification removes the whole outline of a part.
+    ModificationLeavesNothing,
+    /// There are more states than `max_states`.
+    TooManyStates,
+    /// There are more profile points than `max_profile_points`.
+    TooManyPoints,
+    /// There are more variants than `max_study_variants`, or more bytes than `max_study_bytes`.
+    TooManyVariants,
 }
 
-impl Misfit {
-    /// Returns the parameter at fault.
-    pub const fn parameter(self) -> Parameter {
-        match self {
-            Self::RingWithoutRim => Parameter::RingOuterRadius,
-            Self::CarrierMeetsCam => Parameter::CarrierInnerRadius,
-            Self::CarrierMeetsRing | Self::CarrierWithoutWall | Self::SlotsTakeCarrier => Parameter::CarrierOuterRadius,
-            Self::BoreTakesCam => Parameter::BoreRadius,
-            Self::ClearanceTakesCam => Parameter::PartClearance(Part::WaveGenerator),
-            Self::ClearanceTakesTooth => Parameter::PartClearance(Part::Teeth),
-        }
+/// Reason why a drive, a load or a request is impossible. Its text says what to change.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Violation {
+    /// Kind of error.
+    pub code: FieldCode,
+    /// The parameter at fault.
+    pub parameter: Parameter,
+    /// Its value, given or by default, if it is a number.
+    pub value: Option<f64>,
+    /// The violated limit, if it is a number. For a number of teeth or entries, the nearest valid number.
+    pub limit: Option<f64>,
+    /// What is wrong and what to do. `None` for a range: a long list can have many, of which few are ever written.
+    pub detail: Option<String>,
+}
+
+impl Violation {
+    /// Makes the violation of a limit.
+    pub fn new(code: FieldCode, parameter: Parameter, value: f64, limit: f64, detail: String) -> Self {
+        Self { code, parameter, value: Some(value), limit: Some(limit), detail: Some(detail) }
+    }
+
+    /// Makes the violation of a parameter's range, of which `limit` is the violated end.
+    pub const fn out_of_range(parameter: Parameter, value: f64, limit: f64) -> Self {
+        Self { code: FieldCode::OutOfRange, parameter, value: Some(value), limit: Some(limit), detail: None }
+    }
+
+    /// Makes the violation of a choice that others exclude.
+    pub fn conflict(parameter: Parameter, detail: &str) -> Self {
+        Self { code: FieldCode::ConflictingFields, parameter, value: None, limit: None, detail: Some(detail.into()) }
+    }
+
+    /// Makes the violation of a parameter that `projection` does not support.
+    pub fn needs_virtual_work(parameter: Parameter) -> Self {
+        Self::conflict(parameter, "`projection` does not take this: choose `virtual_work`, or leave it out")
+    }
+
+    /// Makes the violation of a modification that leaves nothing of a part's outline. The limit is missing if it is not
+    /// a single number.
+    pub fn modification_leaves_nothing(modified: Modified, value: f64, limit: Option<f64>) -> Self {
+        let choice = match limit {
+            Some(limit) => format!("a value between {limit:?} and zero"),
+            None => "a value nearer to zero".into(),
+        };
+        let detail = format!("modified by {value:?} a part has no outline left that could be made: choose {choice}");
+        let (code, parameter) = (FieldCode::ModificationLeavesNothing, Parameter::Modification(modified));
+        Self { code, parameter, value: Some(value), limit, detail: Some(detail) }
+    }
+
+    /// Makes the violation of a ring whose outer radius does not exceed that of its tooth spaces.
+    pub fn ring_without_rim(outer_mm: f64, root_mm: f64) -> Self {
+        let detail = format!(
+            "an outer radius of {outer_mm:?} mm leaves the ring no rim: choose more than its root radius of {root_mm:?} mm"
+        );
+        Self::new(FieldCode::RingWithoutRim, Parameter::RingOuterRadius, outer_mm, root_mm, detail)
     }
 }
 
@@ -247,123 +142,14 @@ fn readable(value: f64) -> String {
 
 impl std::fmt::Display for Violation {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match *self {
-            Self::OutOfRange { parameter, value, .. } => {
-                let Range { low, high, closed, unit } = parameter.range();
-                let bounds = if closed { "from" } else { "strictly between" };
-                let joint = if closed { "to" } else { "and" };
-                let [value, low, high] = [value, low, high].map(readable);
-                write!(f, "{value} is out of range: choose a value {bounds} {low} {joint} {high}")?;
-                if unit.is_empty() { Ok(()) } else { write!(f, " {unit}") }
-            }
-            Self::CamNotElongated { semi_major_mm, semi_minor_mm } => write!(
-                f,
-                "the semi-major axis ({semi_major_mm:?} mm) must exceed the semi-minor axis ({semi_minor_mm:?} mm): a round cam moves no tooth"
-            ),
-            Self::CamTooSmall { radius_mm, least_mm, .. } => write!(
-                f,
-                "a wave generator of {radius_mm:?} mm is too small for its stroke, its lobes would have cusps, their flanks would meet, or its axis would lie outside: choose more than {least_mm:?} mm, or a smaller stroke"
-            ),
-            Self::ToothDifference { teeth, ring_teeth, lobes, instead } => {
-                let joint = if lobes == 1 { "1 tooth".to_owned() } else { format!("{lobes} teeth") };
-                write!(
-                    f,
-                    "carrier and ring must differ by {joint}, one for each lobe of the wave generator: with {teeth} teeth the ring has {instead}, not {ring_teeth}"
-                )
-            }
-            Self::GrooveTooTight { groove_radius_mm, tooth_radius_mm, .. } => write!(
-                f,
-                "a groove of {groove_radius_mm:?} mm radius is no wider than the balls in it: choose more than their radius of {tooth_radius_mm:?} mm"
-            ),
-            Self::FlatTooLong { flat_length_mm, tooth_diameter_mm } => write!(
-                f,
-                "flats of {flat_length_mm:?} mm length leave nothing of a tooth: choose less than its diameter of {tooth_diameter_mm:?} mm"
-            ),
-            Self::InstalledNoDivisor { installed, teeth, instead } => write!(
-                f,
-                "{installed} installed teeth do not divide {teeth}: teeth are removed evenly, every m-th slot keeps its tooth; choose {instead}"
-            ),
-            Self::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm } => write!(
-                f,
-                "neighbouring teeth of {tooth_diameter_mm:?} mm diameter come as near as {center_distance_mm:?} mm from centre to centre: choose a radius below {touching_radius_mm:?} mm, install fewer, or enlarge the wave generator"
-            ),
-            Self::NoCarrierAnnulus { cam_outer_mm, tip_radius_mm, .. } => write!(
-                f,
-                "the ring's tips ({tip_radius_mm:?} mm) must stay outside the wave generator ({cam_outer_mm:?} mm), or no annulus is left for the carrier: make the teeth thicker or the wave generator rounder, or bore the ring"
-            ),
-            Self::ClearanceNotMonotone { clearance_um, .. } => write!(
-                f,
-                "`projection` weighs this gap of {clearance_um:?} µm negatively at some position, so that it would load a tooth instead of freeing it: choose `virtual_work`, or no clearance of this part and of the teeth"
-            ),
-            Self::NeedsVirtualWork { .. } => {
-                write!(f, "`projection` does not take this: choose `virtual_work`, or leave it out")
-            }
-            Self::TipReliefBeyondFlank { start_deg, engagement_start_deg } => write!(
-                f,
-                "a tip relief from {start_deg:?} deg on relieves nothing: the flank ends at {engagement_start_deg:?} deg"
-            ),
-            Self::ModificationLeavesNothing { value, limit, .. } => {
-                write!(f, "modified by {value:?} a part has no outline left that could be made: choose ")?;
-                match limit {
-                    Some(limit) => write!(f, "a value between {limit:?} and zero"),
-                    None => write!(f, "a value nearer to zero"),
-                }
-            }
-            Self::DeviationCount { count, items, .. } => {
-                write!(f, "{count} entries for {items} items: give one for each, or none")
-            }
-            Self::LawOfOtherTeeth => write!(
-                f,
-                "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have"
-            ),
-            Self::DutyShares { sum } => {
-                write!(
-                    f,
-                    "the shares of time add up to {sum:?}, not to 1: say for each point how much of the running time it takes"
-                )
-            }
-            Self::NoBearingLife => write!(
-                f,
-                "a bearing's life by ISO 281 follows from the load across an eccentric circle: lobes that are loaded alike leave none, and a race that they bend has another life"
-            ),
-            Self::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm } => write!(
-                f,
-                "a bore of {tip_radius_mm:?} mm takes the whole flank away: choose less than the root radius of {root_radius_mm:?} mm"
-            ),
-            Self::PartDoesNotFit { misfit, value, limit } => match misfit {
-                Misfit::RingWithoutRim => write!(
-                    f,
-                    "an outer radius of {value:?} mm leaves the ring no rim: choose more than its root radius of {limit:?} mm"
-                ),
-                Misfit::CarrierMeetsCam => write!(
-                    f,
-                    "a carrier of {value:?} mm inner radius meets the wave generator: choose more than its largest radius of {limit:?} mm"
-                ),
-                Misfit::CarrierMeetsRing => write!(
-                    f,
-                    "a carrier of {value:?} mm outer radius meets the ring: choose less than the ring's tip radius of {limit:?} mm"
-                ),
-                Misfit::CarrierWithoutWall => write!(
-                    f,
-                    "an outer radius of {value:?} mm leaves the carrier no wall: choose more than its inner radius of {limit:?} mm"
-                ),
-                Misfit::SlotsTakeCarrier => write!(
-                    f,
-                    "up to {limit:?} mm from the axis the slots run into each other, which leaves nothing of a carrier of {value:?} mm outer radius: make the teeth thinner or install fewer"
-                ),
-                Misfit::BoreTakesCam => write!(
-                    f,
-                    "a bore of {value:?} mm cuts the wave generator open: choose less than its least radius of {limit:?} mm"
-                ),
-                Misfit::ClearanceTakesCam => write!(
-                    f,
-                    "set back by {value:?} µm the wave generator gets a cusp: choose less than its least radius of curvature, {limit:?} µm"
-                ),
-                Misfit::ClearanceTakesTooth => write!(
-                    f,
-                    "a clearance of {value:?} µm leaves nothing of the teeth: choose less than their radius of {limit:?} µm"
-                ),
-            },
+        if let Some(detail) = &self.detail {
+            return f.write_str(detail);
         }
+        let Range { low, high, closed, unit } = self.parameter.range();
+        let bounds = if closed { "from" } else { "strictly between" };
+        let joint = if closed { "to" } else { "and" };
+        let [value, low, high] = [self.value.unwrap_or(f64::NAN), low, high].map(readable);
+        write!(f, "{value} is out of range: choose a value {bounds} {low} {joint} {high}")?;
+        if unit.is_empty() { Ok(()) } else { write!(f, " {unit}") }
     }
 }

@@ -10,8 +10,7 @@ use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question as _};
 use toothwave_calculation::sweep::{CheckedSweep, Sweep};
 use toothwave_solver::parts::{LEAST_WALL, RIM};
-use toothwave_solver::violation::{Misfit, Parameter, Violation};
-use toothwave_solver::{Drive, Part, SolveError, Stop};
+use toothwave_solver::{Drive, Parameter, Part, SolveError, Stop, Violation};
 use utoipa::ToSchema;
 
 use crate::quantity::{Loaded, OUTER_DIAMETER_MM, Quantity, Takes, Variant};
@@ -41,14 +40,19 @@ pub(crate) enum Outcome {
     Refused(Refusal),
 }
 
+impl Refusal {
+    fn not_calculated(detail: String) -> Self {
+        Self { reason: Reason { code: "not_calculated".into(), pointer: String::new() }, detail }
+    }
+}
+
 impl Outcome {
     /// Refuses a drive that lacks one of these quantities.
     pub(crate) fn with_all(self, quantities: &[&'static Quantity]) -> Self {
         let Self::Answered(values) = &self else { return self };
         let Some((_, quantity)) = values.iter().zip(quantities).find(|(value, _)| value.is_nan()) else { return self };
-        let reason = Reason { code: "not_calculated".into(), pointer: String::new() };
         let detail = format!("this drive has no `{}`: {}", quantity.name, quantity.meaning);
-        Self::Refused(Refusal { reason, detail })
+        Self::Refused(Refusal::not_calculated(detail))
     }
 }
 
@@ -59,6 +63,7 @@ pub struct Stopped;
 /// Reason for missing values.
 enum NoValues {
     Stopped,
+    Hopeless,
     NoAnswer(NoAnswer),
 }
 
@@ -99,14 +104,31 @@ impl Evaluator {
 
     /// Returns the outcome of a document. A panic is an outcome too.
     pub(crate) fn outcome(&self, document: &Tree, stop: &dyn Stop) -> Result<Outcome, Stopped> {
-        caught(|| match self.answer(document, stop) {
+        self.outcome_unless(|_| false, document, stop)
+    }
+
+    /// Returns the outcome of a document. If its drive is hopeless, it is refused before the load is calculated.
+    /// `is_hopeless` receives the quantities, NaN for those that need a load.
+    pub(crate) fn outcome_unless(
+        &self,
+        is_hopeless: impl Fn(&[f64]) -> bool,
+        document: &Tree,
+        stop: &dyn Stop,
+    ) -> Result<Outcome, Stopped> {
+        caught(|| match self.answer(&is_hopeless, document, stop) {
             Ok(values) => Ok(Outcome::Answered(values)),
             Err(NoValues::Stopped) => Err(Stopped),
+            Err(NoValues::Hopeless) => Ok(Outcome::Refused(Refusal::not_calculated("its drive is hopeless".into()))),
             Err(NoValues::NoAnswer(reason)) => Ok(Outcome::Refused(reason.into())),
         })
     }
 
-    fn answer(&self, document: &Tree, stop: &dyn Stop) -> Result<Vec<f64>, NoValues> {
+    fn answer(
+        &self,
+        is_hopeless: &impl Fn(&[f64]) -> bool,
+        document: &Tree,
+        stop: &dyn Stop,
+    ) -> Result<Vec<f64>, NoValues> {
         let design = document.read::<Design>()?.normalised();
         if !self.takes_sweep {
             let drive = CoincidenceDegree.check(&design, &self.limits)?;
@@ -116,6 +138,9 @@ impl Evaluator {
         let checked = Sweep.check(&design, &self.limits)?.without_wear();
         let drive = checked.drive();
         let ring_outer_radius_mm = self.ring_outer_radius_mm(&design, drive)?;
+        if is_hopeless(&self.values_of_drive(&Variant { drive, ring_outer_radius_mm, loaded: None })) {
+            return Err(NoValues::Hopeless);
+        }
         let takes_columns = self.takes_losses || self.takes_radial_forces;
         let loaded = self.loaded(&checked, takes_columns, stop)?;
         Ok(self.values(&Variant { drive, ring_outer_radius_mm, loaded: Some(loaded) })?)
@@ -149,12 +174,19 @@ impl Evaluator {
         let out_of_range = Parameter::PartClearance(Part::Ring).check(parts.ring_clearance_um);
         let out_of_range = out_of_range
             .or_else(|| parts.ring_outer_radius_mm.and_then(|radius| Parameter::RingOuterRadius.check(radius)));
-        let misfit = Misfit::RingWithoutRim;
-        let without_rim = (value <= limit).then_some(Violation::PartDoesNotFit { misfit, value, limit });
-        match out_of_range.or(without_rim) {
+        match out_of_range.or_else(|| (value <= limit).then(|| Violation::ring_without_rim(value, limit))) {
             Some(violation) => Err(NoAnswer::impossible(&[violation])),
             None => Ok(value),
         }
+    }
+
+    /// Returns the quantities that need no load, NaN for all others.
+    fn values_of_drive(&self, variant: &Variant<'_>) -> Vec<f64> {
+        let value = |quantity: &Quantity| match quantity.takes {
+            Takes::Drive => quantity.of(variant).unwrap_or(f64::NAN),
+            _ => f64::NAN,
+        };
+        self.quantities.iter().map(|quantity| value(quantity)).collect()
     }
 
     fn values(&self, variant: &Variant<'_>) -> Result<Vec<f64>, NoAnswer> {

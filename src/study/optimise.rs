@@ -14,7 +14,7 @@
 //! of the other limits is better, then the smaller violation of this limit.
 
 use crate::front::Front;
-use crate::point::Point;
+use crate::point::{Judged, Point};
 use crate::random::Stream;
 
 /// Size of a population.
@@ -62,6 +62,8 @@ pub struct Optimiser {
     plan: Plan,
     stream: Stream,
     shift: Vec<f64>,
+    /// Steps of the scan along each axis.
+    steps: Vec<f64>,
     /// First points, each with its population.
     given: Vec<(usize, Vec<f64>)>,
     asked: u64,
@@ -83,6 +85,7 @@ impl Optimiser {
         let mut shifts = Stream::new(seed, u64::MAX);
         Self {
             shift: (0..plan.dimensions).map(|_| shifts.share()).collect(),
+            steps: scan_steps(plan.dimensions),
             stream: Stream::new(seed, stream),
             relaxations: vec![None; plan.limits],
             plan,
@@ -150,16 +153,9 @@ impl Optimiser {
         &self.populations[self.population]
     }
 
-    /// Returns a point of the sequence: multiples of the powers of 1/φ with `φ^(d+1) = φ + 1`, shifted, modulo 1.
+    /// Returns a point of the sequence: multiples of the steps, shifted, modulo 1.
     fn scan_point(&self, index: u64) -> Vec<f64> {
-        let dimensions = i32::try_from(self.plan.dimensions).unwrap_or(i32::MAX);
-        let mut phi = 1.5_f64;
-        // The iteration is a contraction and has converged after these steps.
-        for _ in 0..64 {
-            phi = (1.0 + phi).powf(1.0 / f64::from(dimensions.saturating_add(1)));
-        }
-        let steps = (1..=dimensions).map(|power| phi.powi(-power));
-        steps.zip(&self.shift).map(|(step, shift)| (shift + (index + 1) as f64 * step).fract()).collect()
+        self.steps.iter().zip(&self.shift).map(|(step, shift)| (shift + (index + 1) as f64 * step).fract()).collect()
     }
 
     fn offspring(&mut self) -> Vec<f64> {
@@ -242,13 +238,38 @@ impl Optimiser {
         let archive = self.archive.points();
         let base = &archive[self.stream.below(archive.len())].place;
         let distance = |place: &[f64]| place.iter().zip(base).map(|(one, other)| (one - other).powi(2)).sum::<f64>();
-        let mut near: Vec<_> = archive.iter().map(|point| (distance(&point.place), &point.place)).collect();
-        near.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let mut near: Vec<_> = archive.iter().map(|point| distance(&point.place)).enumerate().collect();
+        let by = |one: &(usize, f64), other: &(usize, f64)| one.1.total_cmp(&other.1).then(one.0.cmp(&other.0));
+        near.select_nth_unstable_by(NEAR - 1, by);
+        near[..NEAR].sort_unstable_by(by);
         let one = self.stream.below(NEAR);
         let other = (one + 1 + self.stream.below(NEAR - 1)) % NEAR;
         let scale = 0.1 + 0.8 * self.stream.share();
-        let difference = near[one].1.iter().zip(near[other].1).map(|(one, other)| scale * (one - other));
+        let [one, other] = [one, other].map(|at| &archive[near[at].0].place);
+        let difference = one.iter().zip(other).map(|(one, other)| scale * (one - other));
         base.iter().zip(difference).map(|(at, difference)| (at + difference).clamp(0.0, 1.0)).collect()
+    }
+
+    /// Returns true if the last proposed point is useless, given lower bounds of its violations: [`Self::tell`] would
+    /// change nothing.
+    pub fn is_hopeless(&self, least: &Judged) -> bool {
+        let is_nearer = |nearest: &Point| least.beyond(None) < nearest.judged.beyond(None);
+        let mut exceeded = least.violations.iter().enumerate().filter(|(_, violation)| **violation > 0.0);
+        let is_relaxation = match (exceeded.next(), exceeded.next()) {
+            (None, _) => return false,
+            (Some((limit, &violation)), None) => {
+                self.relaxations[limit].as_ref().is_none_or(|before| violation < before.judged.violations[limit])
+            }
+            _ => false,
+        };
+        let relaxed = Self::relaxed(self.population);
+        let members = self.members();
+        let (own, beyond) = (least.beyond(relaxed), |member: &Point| member.judged.beyond(relaxed));
+        let is_worse = match self.parent {
+            Some(parent) => own > beyond(&members[parent]),
+            None => members.len() >= POPULATION && members.iter().all(|member| own >= beyond(member)),
+        };
+        is_worse && !is_relaxation && !self.nearest.as_ref().is_none_or(is_nearer)
     }
 
     /// Receives the evaluation of the last proposed point, or none if it is impossible.
@@ -325,6 +346,17 @@ impl Optimiser {
     }
 }
 
+/// Returns the powers of 1/φ with `φ^(d+1) = φ + 1`.
+fn scan_steps(dimensions: usize) -> Vec<f64> {
+    let dimensions = i32::try_from(dimensions).unwrap_or(i32::MAX);
+    let mut phi = 1.5_f64;
+    // The iteration is a contraction and has converged after these steps.
+    for _ in 0..64 {
+        phi = (1.0 + phi).powf(1.0 / f64::from(dimensions.saturating_add(1)));
+    }
+    (1..=dimensions).map(|power| phi.powi(-power)).collect()
+}
+
 fn order(one: (f64, f64), other: (f64, f64)) -> std::cmp::Ordering {
     one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1))
 }
@@ -392,6 +424,35 @@ mod tests {
         let children: Vec<_> = (0..1000).map(|_| optimiser.differed_among_near()).collect();
         assert!(children.iter().all(|child| ((child[0] - 0.5).abs() - 0.25).abs() < 1e-15));
         assert!(children.iter().any(|child| child[1] > 0.5));
+    }
+
+    /// The first of two limits is known early. Both together cannot be met if the second needs 1.9.
+    #[test]
+    fn skipping_hopeless_points_changes_nothing() {
+        let plan = Plan { dimensions: 2, limits: 2, scan_from: 0, scan: 60, evaluations: 1500 };
+        for needed in [1.0, 1.9] {
+            let run = |skips: bool| {
+                let (mut optimiser, mut skipped) = (Optimiser::new(plan, Vec::new(), 7, 0), 0);
+                while !optimiser.is_over() {
+                    let is_scanning = optimiser.is_scanning();
+                    let place = optimiser.ask();
+                    let (early, late) = ((5.0 * place[0] - 3.0).max(0.0), (needed - place[0] - place[1]).max(0.0));
+                    let least = Judged { objectives: Vec::new(), violations: vec![early, 0.0] };
+                    if skips && !is_scanning && optimiser.is_hopeless(&least) {
+                        skipped += 1;
+                        optimiser.tell(None);
+                        continue;
+                    }
+                    let judged = Judged { objectives: vec![place[0], place[1]], violations: vec![early, late] };
+                    optimiser.tell(Some(Point { place, judged, values: Vec::new() }));
+                }
+                let Optimiser { archive, relaxations, nearest, populations, .. } = optimiser;
+                ((archive.points().to_vec(), relaxations, nearest, populations), skipped)
+            };
+            let ((all, _), (without, skipped)) = (run(false), run(true));
+            assert!(all == without, "needed {needed}, {skipped} skipped");
+            assert!(skipped > 20, "{skipped} skipped");
+        }
     }
 
     /// If all points lie on one face of the cube, children lie there too, except for mutations.

@@ -235,6 +235,15 @@ impl Search {
         Ok(())
     }
 
+    /// Returns the least violations of a variant, given some of its values and NaN for the others.
+    fn least_judged(&self, values: &[f64]) -> Judged {
+        let least = |limit: &Limit| match values[limit.quantity] {
+            value if value.is_finite() => limit.violation(value),
+            _ => 0.0,
+        };
+        Judged { objectives: Vec::new(), violations: self.limits.iter().map(least).collect() }
+    }
+
     fn judged(&self, values: &[f64]) -> Judged {
         let objective = |objective: &Objective| match objective.goal {
             Goal::Min => values[objective.quantity],

@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use serde_json::{Value, json};
-use toothwave_calculation::field::pointer;
 use toothwave_solver::Parameter;
 
 use crate::asking::{Answer, ENDPOINTS, LIMITS, Limits, Question, Service};
@@ -314,21 +313,21 @@ fn every_number_has_the_checked_range() {
     let is_of_number = |of: &Parameter| of.range().low.is_finite() && *of != Parameter::DutyPoints;
     let parameters: Vec<_> = Parameter::all().into_iter().filter(is_of_number).collect();
     for parameter in &parameters {
-        let pointer = pointer(*parameter);
+        let pointer = parameter.to_string();
         let bounds = ["minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"];
         let bounds_of = |schema: &Value| bounds.map(|bound| schema[bound].as_f64());
         let range = parameter.range();
         let (low, high) = (Some(range.low), Some(range.high));
         let expected = if range.closed { [low, high, None, None] } else { [None, None, low, high] };
         // Kinds of wave generator have different ranges at the same place.
-        let at_place = |at: &Parameter| self::pointer(*at) == pointer;
+        let at_place = |at: &Parameter| at.to_string() == pointer;
         let kinds = parameters.iter().filter(|other| at_place(other)).count();
         let mut schemas: Vec<_> = all.iter().filter(|(at, schema)| *at == pointer && is_numeric(schema)).collect();
         schemas.dedup_by_key(|(_, schema)| bounds_of(schema));
         assert_eq!(schemas.len(), kinds, "{pointer}: {schemas:?}");
         assert!(schemas.iter().any(|(_, schema)| bounds_of(schema) == expected), "{pointer}: {schemas:?}");
     }
-    let known: BTreeSet<_> = parameters.into_iter().map(pointer).collect();
+    let known: BTreeSet<_> = parameters.into_iter().map(|parameter| parameter.to_string()).collect();
     let numbers: BTreeSet<_> = all.iter().filter(|(_, schema)| is_numeric(schema)).map(|(at, _)| at.clone()).collect();
     assert_eq!(numbers, known, "numbers of the schema and parameters with a range");
 }

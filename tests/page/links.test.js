@@ -105,6 +105,17 @@ test('file without design is shown with the reason', async () => {
   assert.equal(await page.inputValue('#document-text'), '{ "drive": ');
 });
 
+test('field given twice is refused as by the service', async () => {
+  const page = await bed.open();
+  const before = await designOf(page);
+  const buffer = Buffer.from(JSON.stringify(before).replace('"radius_mm":', '"radius_mm":9,"radius_mm":'));
+  await page.setInputFiles('#document-file', { name: 'twice.json', mimeType: 'application/json', buffer });
+  await page.waitForSelector('#document-error:not([hidden])');
+  assert.match(await page.textContent('#document-error'), /radius_mm.*twice/);
+  await page.click('#document-close');
+  assert.deepEqual(await designOf(page), before);
+});
+
 test('STEP and CSV files equal the API’s answers', async () => {
   const page = await bed.open();
   await enter(page, RADIUS, 4.5);

@@ -4,7 +4,7 @@ use toothwave_solver::drive::Draft;
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::{
-    Compatibility, Contact, ContactLaw, Drive, DriveParameters, LoadCase, PerContact, Position, Violation,
+    Compatibility, Contact, ContactLaw, Drive, DriveParameters, FieldCode, LoadCase, Parameter, PerContact, Position,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, drive, ellipse, load, swept};
@@ -85,9 +85,8 @@ fn is_refused(parameters: &DriveParameters, contact: Contact) -> bool {
     let mut load = load(20.0, Compatibility::Projection);
     load.clearance_um = PerContact::of(|other| if other == contact { 10.0 } else { 0.0 });
     let violations = load.clearance_violations(&Draft::new(parameters).unwrap()).unwrap();
-    assert!(
-        violations.iter().all(|v| matches!(v, Violation::ClearanceNotMonotone { contact: c, .. } if *c == contact))
-    );
+    let parameter = Parameter::PartClearance(contact.mate());
+    assert!(violations.iter().all(|v| v.code == FieldCode::ClearanceNotMonotone && v.parameter == parameter));
     !violations.is_empty()
 }
 

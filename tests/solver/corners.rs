@@ -616,7 +616,7 @@ fn flat_before_flank_is_pressed_as_cylinder() {
 #[test]
 fn corners_need_virtual_work() {
     let refused = LoadCase::new(&LoadParameters { corner_contact: true, ..load(3.0, Projection) });
-    assert_eq!(refused, Err(vec![Violation::NeedsVirtualWork { parameter: Parameter::CornerContact }]));
+    assert_eq!(refused, Err(vec![Violation::needs_virtual_work(Parameter::CornerContact)]));
 }
 
 /// Covers several laws, unlike zones, gaps and a bored tip.

@@ -11,8 +11,8 @@ use toothwave_solver::losses::{Friction, FrictionParameters, WaveGeneratorFricti
 use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{self, Points, Sweep};
 use toothwave_solver::{
-    ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Modification, Never, Parameter,
-    PerContact, SolveError, ToothShape, Violation, WaveGenerator,
+    ContactLaw, Deviations, Drive, DriveParameters, FieldCode, LoadCase, LoadParameters, Modification, Never,
+    Parameter, PerContact, SolveError, ToothShape, Violation, WaveGenerator,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2_BORED, drive, ellipse, everywhere, load, swept};
@@ -625,9 +625,11 @@ fn reports_all_impossible_deviations() {
     };
     let refused = swept_with(&drive, &load(20.0, Projection), &wrong, Points::samples(4).unwrap()).unwrap_err();
     let SolveError::Impossible(violations) = refused else { panic!("{refused:?}") };
-    let counted = |violation: &Violation| matches!(violation, Violation::DeviationCount { count: 27, items: 28, .. });
+    let counted = |violation: &Violation| {
+        matches!(violation, Violation { code: FieldCode::WrongLength, value: Some(27.0), limit: Some(28.0), .. })
+    };
     assert!(violations.iter().any(counted), "{violations:?}");
-    assert!(violations.contains(&Violation::NeedsVirtualWork { parameter: Parameter::Deviations }));
+    assert!(violations.contains(&Violation::needs_virtual_work(Parameter::Deviations)));
     assert_eq!(violations.len(), 4, "{violations:?}");
     // Zero deviations need the right length too.
     let nil = Deviations { slot_wall_um: vec![0.0; 27], ..Deviations::default() };

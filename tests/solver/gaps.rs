@@ -10,8 +10,8 @@ use toothwave_solver::mesh::{Mesh, Place, Samples};
 use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::violation::{Listed, Modified};
 use toothwave_solver::{
-    Drive, DriveParameters, LoadCase, LoadParameters, Modification, Never, Parameter, PerContact, Position, SolveError,
-    Violation,
+    Drive, DriveParameters, FieldCode, LoadCase, LoadParameters, Modification, Never, Parameter, PerContact, Position,
+    SolveError, Violation,
     sweep::{self, Points},
 };
 
@@ -263,8 +263,10 @@ fn tip_relief_grows_from_start_to_flank_end() {
     let late = Modification { ring_tip_relief: Some(TipRelief { start_deg: 90.0, ..relief }), ..modification };
     let case = LoadCase::new(&LoadParameters { modification: late, ..load(20.0, VirtualWork) }).unwrap();
     let refused = LoadedDrive::new(&drive, &case).unwrap_err();
-    let violation = Violation::TipReliefBeyondFlank { start_deg: 90.0, engagement_start_deg: 90.0 };
-    assert_eq!(refused, SolveError::Impossible(vec![violation]));
+    let SolveError::Impossible(found) = refused else { panic!("{refused:?}") };
+    let parameter = Parameter::Modification(Modified::TipReliefStart);
+    let detail = "a tip relief from 90.0 deg on relieves nothing: the flank ends at 90.0 deg";
+    assert_eq!(found, [Violation::new(FieldCode::OutOfRange, parameter, 90.0, 90.0, detail.into())]);
 }
 
 #[test]
@@ -397,7 +399,7 @@ fn turned_carrier_makes_room_for_thick_walls() {
 fn rejects_deviations_under_projection_or_of_wrong_length() {
     let modification = Modification { slot_wall_um: 1.0, ..Modification::default() };
     let refused = LoadCase::new(&LoadParameters { modification, ..load(20.0, Projection) }).unwrap_err();
-    assert_eq!(refused, [Violation::NeedsVirtualWork { parameter: Parameter::Modification(Modified::SlotWall) }]);
+    assert_eq!(refused, [Violation::needs_virtual_work(Parameter::Modification(Modified::SlotWall))]);
     let drive = drive(&PAPER_5_1);
     let with = |compatibility, deviations: &Deviations| {
         let case = LoadCase::new(&load(20.0, compatibility)).unwrap();
@@ -405,15 +407,17 @@ fn rejects_deviations_under_projection_or_of_wrong_length() {
     };
     let some = Deviations { slot_wall_um: vec![1.0; 28], ..Deviations::default() };
     assert_eq!(with(VirtualWork, &some), Ok(()));
-    let violation = Violation::NeedsVirtualWork { parameter: Parameter::Deviations };
+    let violation = Violation::needs_virtual_work(Parameter::Deviations);
     assert_eq!(with(Projection, &some), Err(SolveError::Impossible(vec![violation])));
     let few = Deviations { ring_space_um: vec![1.0; 28], ..Deviations::default() };
-    let violation = Violation::DeviationCount { listed: Listed::RingSpace, count: 28, items: 26 };
+    let (parameter, detail) =
+        (Parameter::DeviationList(Listed::RingSpace), "28 entries for 26 items: give one for each, or none");
+    let violation = Violation::new(FieldCode::WrongLength, parameter, 28.0, 26.0, detail.into());
     assert_eq!(with(VirtualWork, &few), Err(SolveError::Impossible(vec![violation])));
     let mut odd = vec![0.0; 28];
     odd[3] = f64::INFINITY;
     let odd = Deviations { slot_wall_um: odd, ..Deviations::default() };
     let parameter = Parameter::Deviation(Listed::SlotWall, 3);
-    let violation = Violation::OutOfRange { parameter, value: f64::INFINITY, limit: 1e6 };
+    let violation = Violation::out_of_range(parameter, f64::INFINITY, 1e6);
     assert_eq!(with(VirtualWork, &odd), Err(SolveError::Impossible(vec![violation])));
 }

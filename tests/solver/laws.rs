@@ -14,8 +14,8 @@ use toothwave_solver::tooth::flat::FlatContact;
 use toothwave_solver::tooth::point::EllipticContact;
 use toothwave_solver::tooth::{Pressure, ToothContact};
 use toothwave_solver::{
-    Contact, ContactLaw, Drive, DriveParameters, Finding, FindingCode, LoadCase, LoadParameters, Material, Materials,
-    Never, Parameter, PerContact, Position, SolveError, ToothShape, Violation, findings,
+    Contact, ContactLaw, Drive, DriveParameters, FieldCode, Finding, FindingCode, LoadCase, LoadParameters, Material,
+    Materials, Never, Parameter, PerContact, Position, SolveError, ToothShape, Violation, findings,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, cases, drive, everywhere, load, swept};
@@ -418,11 +418,11 @@ fn tolerance_sweep_finds_peaks_under_these_laws() {
 fn projection_rejects_johnsons_law_and_series_compliance() {
     let refused = |parameters: LoadParameters| LoadCase::new(&parameters).unwrap_err();
     let projected = LoadParameters { law: ContactLaw::JOHNSON, ..load(20.0, Projection) };
-    assert_eq!(refused(projected), [Violation::NeedsVirtualWork { parameter: Parameter::Law }]);
+    assert_eq!(refused(projected), [Violation::needs_virtual_work(Parameter::Law)]);
     let mut springy = load(20.0, Projection);
     springy.series_compliance_mm_per_n.carrier = 1e-6;
     let parameter = Parameter::SeriesCompliance(Contact::Carrier);
-    assert_eq!(refused(springy), [Violation::NeedsVirtualWork { parameter }]);
+    assert_eq!(refused(springy), [Violation::needs_virtual_work(parameter)]);
     let mut soft = johnson(20.0);
     soft.series_compliance_mm_per_n.ring = -1e-9;
     soft.law = ContactLaw::Johnson { depth_mm: PerContact { wave_generator: Some(0.0), ring: None, carrier: None } };
@@ -689,9 +689,13 @@ fn given_carrier_bears_the_flats() {
     ];
     for (inner_mm, outer_mm, at_fault) in impossible {
         let load = LoadParameters { carrier: CarrierRadii { inner_mm, outer_mm }, ..load(20.0, VirtualWork) };
+        use FieldCode::{CarrierMeetsCam, CarrierMeetsRing, CarrierWithoutWall, OutOfRange};
         let parameter = |violations: &[Violation]| match violations {
-            [Violation::PartDoesNotFit { misfit, .. }] => misfit.parameter(),
-            [Violation::OutOfRange { parameter, .. }] => *parameter,
+            [
+                Violation {
+                    code: CarrierMeetsCam | CarrierMeetsRing | CarrierWithoutWall | OutOfRange, parameter, ..
+                },
+            ] => *parameter,
             other => panic!("{other:?}"),
         };
         assert_eq!(parameter(&load.carrier_violations(&draft)), at_fault);
@@ -767,7 +771,10 @@ fn only_balls_take_hertz_beside_fixed() {
         match LoadedDrive::with_teeth(&drive, &case, shape) {
             Ok(_) => true,
             Err(error) => {
-                assert_eq!(error, SolveError::Impossible(vec![Violation::LawOfOtherTeeth]));
+                let SolveError::Impossible(found) = error else { panic!("{error:?}") };
+                let about = found.iter().map(|v| (v.code, v.parameter)).collect::<Vec<_>>();
+                assert_eq!(about, [(FieldCode::ConflictingFields, Parameter::Law)]);
+                assert!(found[0].to_string().starts_with("balls take `hertz` or `fixed`"), "{found:?}");
                 false
             }
         }

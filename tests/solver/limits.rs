@@ -2,9 +2,9 @@
 
 use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::{
-    Compatibility, Contact, ContactLaw, Drive, DriveParameters, Finding, FindingCode, LoadCase, LoadParameters,
-    Modification, Never, Parameter, PerContact, Position, Severity, SolveError, ToothShape, Torque, Violation,
-    WaveGenerator, findings,
+    Compatibility, Contact, ContactLaw, Drive, DriveParameters, FieldCode, Finding, FindingCode, LoadCase,
+    LoadParameters, Modification, Never, Parameter, PerContact, Position, Severity, SolveError, ToothShape, Torque,
+    Violation, WaveGenerator, findings,
     mesh::{Mesh, Samples},
     sweep::{self, Points},
 };
@@ -18,11 +18,15 @@ fn violations(parameters: &DriveParameters) -> Vec<Violation> {
     }
 }
 
+fn is_out_of_range(violation: &Violation, parameter: Parameter) -> bool {
+    violation.code == FieldCode::OutOfRange && violation.parameter == parameter
+}
+
 #[test]
 fn value_out_of_range_is_written_readably() {
     let told = |tooth_radius_mm| {
         let found = violations(&DriveParameters { tooth_radius_mm, ..PAPER_5_1 });
-        let of_radius = |v: &&Violation| matches!(v, Violation::OutOfRange { parameter: Parameter::ToothRadius, .. });
+        let of_radius = |v: &&Violation| is_out_of_range(v, Parameter::ToothRadius);
         found.iter().find(of_radius).unwrap().to_string()
     };
     for (value, written) in [(0.0, "0"), (-0.5, "-0.5"), (2e6, "2000000"), (1e7, "1e7"), (5e-7, "5e-7")] {
@@ -42,24 +46,29 @@ fn reports_all_impossible_values_at_once() {
         tip_radius_mm: Some(0.0),
     };
     let found = violations(&parameters);
-    let out_of_range =
-        |parameter| found.iter().any(|v| matches!(v, Violation::OutOfRange { parameter: p, .. } if *p == parameter));
+    let out_of_range = |parameter| found.iter().any(|v| is_out_of_range(v, parameter));
     assert!(out_of_range(Parameter::ToothRadius));
     assert!(out_of_range(Parameter::ToothWidth));
     assert!(out_of_range(Parameter::TipRadius));
-    assert!(found.iter().any(|v| matches!(v, Violation::CamNotElongated { .. })));
-    assert!(found.iter().any(|v| matches!(v, Violation::ToothDifference { teeth: 28, ring_teeth: 27, .. })));
-    assert!(found.iter().any(|v| matches!(v, Violation::InstalledNoDivisor { installed: 9, teeth: 28, .. })));
+    let told = |code, value, words: &str| {
+        found.iter().any(|v| v.code == code && v.value == Some(value) && v.to_string().contains(words))
+    };
+    assert!(told(FieldCode::CamNotElongated, 56.0, "must exceed the semi-minor axis (58.0 mm)"));
+    assert!(told(FieldCode::ToothDifference, 27.0, "with 28 teeth the ring has 26 or 30, not 27"));
+    assert!(told(FieldCode::InstalledNoDivisor, 9.0, "9 installed teeth do not divide 28"));
     assert_eq!(found.len(), 6);
 }
 
 #[test]
 fn neighbouring_teeth_must_not_touch() {
     let touching = violations(&DriveParameters { tooth_radius_mm: 7.2, ..PAPER_5_1 });
-    let [Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, .. }] = touching[..] else {
+    let [Violation { code: FieldCode::TeethTouch, value: Some(7.2), .. }] = touching[..] else {
         panic!("{touching:?}")
     };
-    assert!(center_distance_mm <= tooth_diameter_mm);
+    let told = touching[0].to_string();
+    let told = told.strip_prefix("neighbouring teeth of 14.4 mm diameter come as near as ").expect("the diameter");
+    let center_distance_mm: f64 = told.split(' ').next().unwrap().parse().unwrap();
+    assert!(center_distance_mm > 14.0 && center_distance_mm <= 14.4, "{center_distance_mm}");
     // The pair that straddles the minor axis is the nearest: its centres lie on a line parallel to the major axis.
     let p = DriveParameters { tooth_radius_mm: 7.0, ..PAPER_5_1 };
     let fitting = drive(&p);
@@ -100,17 +109,14 @@ fn three_teeth_are_nearest_across_major_axis() {
 /// Returns the touching radius that the violation of these parameters reports.
 fn touching_radius_mm(parameters: &DriveParameters) -> f64 {
     let found = violations(parameters);
-    let radius = found.iter().find_map(|violation| match violation {
-        Violation::TeethTouch { touching_radius_mm, .. } => Some(*touching_radius_mm),
-        _ => None,
-    });
-    radius.unwrap_or_else(|| panic!("{found:?}"))
+    let touching = found.iter().find(|violation| violation.code == FieldCode::TeethTouch);
+    touching.and_then(|violation| violation.limit).unwrap_or_else(|| panic!("{found:?}"))
 }
 
 fn teeth_touch(parameters: &DriveParameters) -> bool {
     match Drive::new(parameters) {
         Ok(_) => false,
-        Err(DriveError::Impossible(found)) => found.iter().any(|v| matches!(v, Violation::TeethTouch { .. })),
+        Err(DriveError::Impossible(found)) => found.iter().any(|v| v.code == FieldCode::TeethTouch),
         Err(error) => panic!("{error}"),
     }
 }
@@ -225,45 +231,36 @@ fn thicker_teeth_have_narrower_gaps() {
     }
 }
 
+/// Returns the violations of tooth numbers that do not fit each other.
+fn told_of_counts(teeth: i64, installed: i64, ring_teeth: i64) -> Vec<Violation> {
+    let found = violations(&DriveParameters { teeth, installed, ring_teeth, ..PAPER_5_1 });
+    let of_counts = |v: &Violation| matches!(v.code, FieldCode::ToothDifference | FieldCode::InstalledNoDivisor);
+    found.into_iter().filter(of_counts).collect()
+}
+
 #[test]
 fn impossible_tooth_count_has_possible_neighbours() {
-    let beside = |teeth, installed, ring_teeth| -> Vec<_> {
-        let found = violations(&DriveParameters { teeth, installed, ring_teeth, ..PAPER_5_1 });
-        found
-            .iter()
-            .filter_map(|violation| match violation {
-                Violation::ToothDifference { instead, .. } | Violation::InstalledNoDivisor { instead, .. } => {
-                    Some((instead.below, instead.above))
-                }
-                _ => None,
-            })
-            .collect()
+    let is_told = |teeth, installed, ring_teeth, words: &str| {
+        let told = told_of_counts(teeth, installed, ring_teeth);
+        assert!(told.len() == 1 && told[0].to_string().ends_with(words), "{told:?}: not {words}");
     };
-    assert_eq!(beside(28, 8, 26), [(Some(7), Some(14))]);
-    assert_eq!(beside(28, 56, 26), [(Some(28), None)]);
-    assert_eq!(beside(27, 4, 25), [(Some(3), Some(9))]);
-    assert_eq!(beside(2, 2, 2), [(None, Some(4))]);
-    assert_eq!(beside(10_000, 10_000, 10_000), [(Some(9_998), None)]);
-    assert_eq!(beside(28, 28, 28), [(Some(26), Some(30))]);
+    is_told(28, 8, 26, "; choose 7 or 14");
+    is_told(28, 56, 26, "; choose 28");
+    is_told(27, 4, 25, "; choose 3 or 9");
+    is_told(2, 2, 2, " the ring has 4, not 2");
+    is_told(10_000, 10_000, 10_000, " the ring has 9998, not 10000");
+    is_told(28, 28, 28, " the ring has 26 or 30, not 28");
 }
 
 #[test]
 fn proposes_nearest_count_and_lower_on_tie() {
-    let proposed = |teeth, installed, ring_teeth| {
-        let found = violations(&DriveParameters { teeth, installed, ring_teeth, ..PAPER_5_1 });
-        let nearest = found.iter().find_map(|violation| match violation {
-            Violation::ToothDifference { instead, ring_teeth, .. } => Some(instead.nearest_to(*ring_teeth)),
-            Violation::InstalledNoDivisor { instead, installed, .. } => Some(instead.nearest_to(*installed)),
-            _ => None,
-        });
-        nearest.unwrap()
-    };
-    assert_eq!(proposed(28, 8, 26), 7);
-    assert_eq!(proposed(28, 12, 26), 14);
-    assert_eq!(proposed(27, 8, 25), 9);
-    assert_eq!(proposed(27, 6, 25), 3);
-    assert_eq!(proposed(28, 56, 26), 28);
-    assert_eq!(proposed(28, 28, 28), 26);
+    let proposed = |teeth, installed, ring_teeth| told_of_counts(teeth, installed, ring_teeth)[0].limit.unwrap();
+    assert_eq!(proposed(28, 8, 26), 7.0);
+    assert_eq!(proposed(28, 12, 26), 14.0);
+    assert_eq!(proposed(27, 8, 25), 9.0);
+    assert_eq!(proposed(27, 6, 25), 3.0);
+    assert_eq!(proposed(28, 56, 26), 28.0);
+    assert_eq!(proposed(28, 28, 28), 26.0);
 }
 
 #[test]
@@ -285,7 +282,7 @@ fn shared_allowable_stress_is_reported_once() {
         let allowable_stress_mpa = Some(PerContact { wave_generator, ring, carrier });
         let load = LoadParameters { allowable_stress_mpa, ..load(20.0, Compatibility::Projection) };
         let of_range = |violation: Violation| match violation {
-            Violation::OutOfRange { parameter, .. } => parameter,
+            Violation { code: FieldCode::OutOfRange, parameter, .. } => parameter,
             other => panic!("{other:?}"),
         };
         LoadCase::new(&load).unwrap_err().into_iter().map(of_range).collect()
@@ -394,13 +391,16 @@ fn any_divisor_of_teeth_may_be_installed() {
 #[test]
 fn carrier_needs_an_annulus() {
     let p = DriveParameters { wave_generator: ellipse(60.0, 48.0), tooth_radius_mm: 1.0, ..PAPER_5_1 };
-    assert!(matches!(violations(&p)[..], [Violation::NoCarrierAnnulus { .. }]));
+    assert!(matches!(violations(&p)[..], [Violation { code: FieldCode::NoCarrierAnnulus, .. }]));
 }
 
 #[test]
 fn bore_must_leave_some_flank() {
     let bored = |tip_radius_mm| DriveParameters { tip_radius_mm: Some(tip_radius_mm), ..PAPER_5_1 };
-    assert!(matches!(violations(&bored(68.0))[..], [Violation::BoreLeavesNoFlank { root_radius_mm: 68.0, .. }]));
+    let found = violations(&bored(68.0));
+    let [Violation { code: FieldCode::BoreLeavesNoFlank, limit: Some(68.0), .. }] = found[..] else {
+        panic!("{found:?}")
+    };
     assert!(Drive::new(&bored(67.999)).is_ok());
 }
 
@@ -428,7 +428,7 @@ fn teeth_on_given_path_touch_at_valley_chord() {
         let p = DriveParameters { wave_generator, tooth_radius_mm: share * half_chord_mm, ..PAPER_5_1 };
         match Drive::new(&p) {
             Ok(_) => false,
-            Err(DriveError::Impossible(found)) => found.iter().any(|v| matches!(v, Violation::TeethTouch { .. })),
+            Err(DriveError::Impossible(found)) => found.iter().any(|v| v.code == FieldCode::TeethTouch),
             Err(other) => panic!("{other}"),
         }
     };
@@ -496,11 +496,11 @@ fn bore_inside_natural_tip_is_only_a_finding() {
 #[test]
 fn rejects_impossible_sample_count_or_tolerance() {
     for count in [0, 10_000_001, u64::MAX] {
-        assert!(matches!(Points::samples(count), Err(Violation::OutOfRange { parameter: Parameter::Samples, .. })));
+        assert!(is_out_of_range(&Points::samples(count).unwrap_err(), Parameter::Samples));
     }
     for tolerance in [f64::NAN, 0.0, -1e-3, f64::INFINITY] {
         let refused = Points::tolerance(tolerance, 1000);
-        assert!(matches!(refused, Err(Violation::OutOfRange { parameter: Parameter::SweepTolerance, .. })));
+        assert!(is_out_of_range(&refused.unwrap_err(), Parameter::SweepTolerance));
     }
     assert!(Points::samples(1).is_ok() && Points::tolerance(1e-12, 1).is_ok());
     assert_eq!(Points::finest(7), Points::tolerance(1e-12, 7).unwrap());

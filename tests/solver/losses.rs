@@ -18,8 +18,8 @@ use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::sweep::{Points, States, sweep, sweep_with_deviations};
 use toothwave_solver::tooth::Pressure;
 use toothwave_solver::{
-    Compatibility, Contact, ContactLaw, Deviations, DriveParameters, LoadCase, LoadParameters, Modification, Never,
-    Parameter, PerContact, SolveError, ToothShape, Violation, WaveGenerator,
+    Compatibility, Contact, ContactLaw, Deviations, DriveParameters, FieldCode, LoadCase, LoadParameters, Modification,
+    Never, Parameter, PerContact, SolveError, ToothShape, Violation, WaveGenerator,
 };
 
 use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, everywhere, load};
@@ -715,7 +715,7 @@ fn impossible_friction_reports_every_value() {
         .unwrap_err()
         .iter()
         .map(|violation| match *violation {
-            Violation::OutOfRange { parameter, limit, .. } => (parameter, limit),
+            Violation { code: FieldCode::OutOfRange, parameter, limit: Some(limit), .. } => (parameter, limit),
             ref other => panic!("{other:?}"),
         })
         .collect();

@@ -652,5 +652,5 @@ fn tolerance_sweep_sees_capacity_before_tooth_entry() {
 #[test]
 fn projection_rejects_moving_wave_generator() {
     let refused = LoadCase::new(&LoadParameters { wave_generator_moves: true, ..load(3.0, Projection) });
-    assert_eq!(refused, Err(vec![Violation::NeedsVirtualWork { parameter: Parameter::WaveGeneratorMoves }]));
+    assert_eq!(refused, Err(vec![Violation::needs_virtual_work(Parameter::WaveGeneratorMoves)]));
 }

@@ -143,7 +143,7 @@ fn bending_acts_as_ring_compliance_in_load_sharing() {
 #[test]
 fn projection_rejects_bending_ring_teeth() {
     let refused = LoadCase::new(&LoadParameters { ring_teeth_bend: true, ..load(3.0, Projection) });
-    assert_eq!(refused, Err(vec![Violation::NeedsVirtualWork { parameter: Parameter::RingTeethBend }]));
+    assert_eq!(refused, Err(vec![Violation::needs_virtual_work(Parameter::RingTeethBend)]));
 }
 
 /// Includes rings of few teeth, very short flanks, and all kinds of tips.

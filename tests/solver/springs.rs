@@ -10,8 +10,8 @@ use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::springs::{Rotation, Spring, Springs};
 use toothwave_solver::sweep::{self, Points};
 use toothwave_solver::{
-    Contact, ContactLaw, Deviations, DriveParameters, LoadCase, LoadParameters, Modification, Never, PerContact,
-    Position, SolveError, ToothShape, Torque, Violation,
+    Contact, ContactLaw, Deviations, DriveParameters, FieldCode, LoadCase, LoadParameters, Modification, Never,
+    Parameter, Part, PerContact, Position, SolveError, ToothShape, Torque, Violation,
 };
 
 use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, cases, drive, ellipse, everywhere, load, swept};
@@ -155,8 +155,11 @@ fn crate_refuses_gap_that_projection_turns_into_load() {
     parameters.clearance_um.carrier = 500.0;
     let case = LoadCase::new(&parameters).unwrap();
     let refused = sweep::sweep(&larger, &case, Points::samples(10).unwrap(), &Never);
-    let violation = Violation::ClearanceNotMonotone { contact: Contact::Carrier, clearance_um: 500.0 };
-    assert_eq!(refused, Err(SolveError::Impossible(vec![violation])));
+    let Err(SolveError::Impossible(found)) = refused else { panic!("{refused:?}") };
+    let [Violation { code: FieldCode::ClearanceNotMonotone, parameter, value: Some(500.0), .. }] = found[..] else {
+        panic!("{found:?}")
+    };
+    assert_eq!(parameter, Parameter::PartClearance(Part::Carrier));
 }
 
 #[test]

@@ -103,7 +103,10 @@ impl FrictionDocument {
     pub(super) fn loss_parameters(&self, is_eccentric: bool) -> Result<LossParameters, Vec<Violation>> {
         let mut violations = self.violations_beside();
         if self.bearing_rating().is_some() && !is_eccentric {
-            violations.push(Violation::NoBearingLife);
+            violations.push(Violation::conflict(
+                Parameter::BearingLoadRating,
+                "a bearing's life by ISO 281 follows from the load across an eccentric circle: lobes that are loaded alike leave none, and a race that they bend has another life",
+            ));
         }
         match Friction::new(&self.into()) {
             Ok(friction) if violations.is_empty() => {

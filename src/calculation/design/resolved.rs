@@ -9,7 +9,7 @@ use super::{
     ClearanceDocument, Design, DriveDocument, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
     Refinements, RefinementsDocument, StiffnessDocument, StrengthDocument, TeethDocument,
 };
-use crate::field::{FieldCode, contact_name, pointer};
+use crate::field::FieldCode;
 use crate::json::Fault;
 
 /// Relative difference of a gap and a sum of clearances that is due to rounding.
@@ -104,10 +104,9 @@ impl Design {
             let differs = (gap_um - of_parts).abs() > ROUNDING * gap_um.abs();
             if gap_um != 0.0 && of_parts != 0.0 && differs {
                 let detail = format!(
-                    "the gap is {gap_um:?} µm here, and {of_parts:?} µm by `parts.{}.clearance_um` and `parts.teeth.clearance_um`; leave out `model.clearance`, which is deprecated",
-                    contact_name(contact)
+                    "the gap is {gap_um:?} µm here, and {of_parts:?} µm by `parts.{contact}.clearance_um` and `parts.teeth.clearance_um`; leave out `model.clearance`, which is deprecated"
                 );
-                let pointer = pointer(Parameter::Clearance(contact));
+                let pointer = Parameter::Clearance(contact).to_string();
                 return Err(Fault { pointer, code: FieldCode::ConflictingFields, detail });
             }
         }

@@ -9,7 +9,7 @@ mod harmonic;
 mod harmonic_path;
 mod kind;
 
-use crate::violation::{Parameter, Violation};
+use crate::violation::{FieldCode, Parameter, Violation};
 
 pub use ellipse::Ellipse;
 pub use harmonic::Harmonic;
@@ -143,7 +143,11 @@ impl WaveGenerator {
                 if semi_major_mm > semi_minor_mm {
                     Ok(Cam::Ellipse(Ellipse::new(semi_major_mm, semi_minor_mm)))
                 } else {
-                    Err(Violation::CamNotElongated { semi_major_mm, semi_minor_mm })
+                    let detail = format!(
+                        "the semi-major axis ({semi_major_mm:?} mm) must exceed the semi-minor axis ({semi_minor_mm:?} mm): a round cam moves no tooth"
+                    );
+                    let code = FieldCode::CamNotElongated;
+                    Err(Violation::new(code, Parameter::SemiMajor, semi_major_mm, semi_minor_mm, detail))
                 }
             }
             Self::Eccentric { radius_mm: radius, eccentricity_mm: stroke }
@@ -165,7 +169,10 @@ impl WaveGenerator {
             Ok(())
         } else {
             let [parameter, _] = self.size_and_shape();
-            Err(Violation::CamTooSmall { parameter, radius_mm, least_mm })
+            let detail = format!(
+                "a wave generator of {radius_mm:?} mm is too small for its stroke, its lobes would have cusps, their flanks would meet, or its axis would lie outside: choose more than {least_mm:?} mm, or a smaller stroke"
+            );
+            Err(Violation::new(FieldCode::CamTooSmall, parameter, radius_mm, least_mm, detail))
         }
     }
 }

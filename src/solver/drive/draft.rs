@@ -1,12 +1,13 @@
 //! What can be computed of parameters that a drive may not have, with every reason why it cannot.
 
 use super::neighbours::Neighbours;
+use super::tooth_counts::{installed_no_divisor, tooth_difference};
 use super::{Drive, DriveParameters, ToothShape};
 use crate::cam::WaveGenerator;
 use crate::locus::Locus;
 use crate::ring::{RingFlank, RingTooth};
 use crate::root::NotConverged;
-use crate::violation::{Alternatives, Parameter, Violation};
+use crate::violation::{FieldCode, Parameter, Violation};
 
 /// Parameters of which some may be impossible. Each check runs as soon as the values that it needs are possible, so one
 /// impossible value hides no other.
@@ -36,9 +37,7 @@ impl Draft {
         let p = *parameters;
         let mut violations = Vec::new();
         let mut is_in_range = |parameter: Parameter, value: f64| {
-            let violation = parameter.check(value);
-            violations.extend(violation);
-            violation.is_none()
+            parameter.check(value).map(|violation| violations.push(violation)).is_none()
         };
         let mut are_in_range = |parameters: &[(Parameter, f64)]| {
             parameters.iter().fold(true, |all, &(parameter, value)| is_in_range(parameter, value) && all)
@@ -74,17 +73,12 @@ impl Draft {
         });
         let mut sense = None;
         if let Some(((teeth, ring_teeth), lobes)) = teeth.zip(ring_teeth).zip(lobes) {
-            let instead = Alternatives::to_ring_beside(teeth, lobes);
-            if instead.contains(ring_teeth) {
-                sense = Some(if teeth > ring_teeth { 1.0 } else { -1.0 });
-            } else {
-                violations.push(Violation::ToothDifference { teeth, ring_teeth, lobes, instead });
+            match tooth_difference(teeth, ring_teeth, lobes) {
+                Some(violation) => violations.push(violation),
+                None => sense = Some(if teeth > ring_teeth { 1.0 } else { -1.0 }),
             }
         }
-        if let Some((installed, teeth)) = installed.zip(teeth).filter(|(installed, teeth)| teeth % installed != 0) {
-            let instead = Alternatives::to_installed(installed, teeth);
-            violations.push(Violation::InstalledNoDivisor { installed, teeth, instead });
-        }
+        violations.extend(installed.zip(teeth).and_then(|(installed, teeth)| installed_no_divisor(installed, teeth)));
         let mut slot_half_width_mm = None;
         if let Some(tooth_radius_mm) = tooth_radius_mm {
             violations.extend(p.tooth.violations(tooth_radius_mm));
@@ -97,7 +91,11 @@ impl Draft {
         {
             let root_radius_mm = cam_outer_mm + 2.0 * tooth_radius_mm;
             if tip_radius_mm >= root_radius_mm {
-                violations.push(Violation::BoreLeavesNoFlank { tip_radius_mm, root_radius_mm });
+                let detail = format!(
+                    "a bore of {tip_radius_mm:?} mm takes the whole flank away: choose less than the root radius of {root_radius_mm:?} mm"
+                );
+                let (code, parameter) = (FieldCode::BoreLeavesNoFlank, Parameter::TipRadius);
+                violations.push(Violation::new(code, parameter, tip_radius_mm, root_radius_mm, detail));
                 bore_is_possible = false;
             }
         }
@@ -119,13 +117,10 @@ impl Draft {
                     // At a regular tip, where the ring is farthest in, the carrier has space if e < r.
                     _ => p.tooth_radius_mm,
                 };
-                violations.push(Violation::NoCarrierAnnulus {
-                    parameter,
-                    value_mm,
-                    limit_mm,
-                    cam_outer_mm,
-                    tip_radius_mm,
-                });
+                let detail = format!(
+                    "the ring's tips ({tip_radius_mm:?} mm) must stay outside the wave generator ({cam_outer_mm:?} mm), or no annulus is left for the carrier: make the teeth thicker or the wave generator rounder, or bore the ring"
+                );
+                violations.push(Violation::new(FieldCode::NoCarrierAnnulus, parameter, value_mm, limit_mm, detail));
             }
         }
         if let Some((locus, installed)) = locus.zip(installed) {

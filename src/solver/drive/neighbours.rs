@@ -6,7 +6,7 @@ use crate::cam::{Cam, Ellipse};
 use crate::locus::Locus;
 use crate::position::{Position, half_lobe_rad};
 use crate::root::{NotConverged, bracketed};
-use crate::violation::Violation;
+use crate::violation::{FieldCode, Parameter, Violation};
 
 /// Neighbouring teeth on their path.
 #[derive(Debug, Clone, Copy)]
@@ -38,8 +38,12 @@ impl Neighbours {
         if center_distance_mm > tooth_diameter_mm {
             return Ok(None);
         }
-        let touching_radius_mm = self.touching_radius_mm(center_distance_mm)?;
-        Ok(Some(Violation::TeethTouch { tooth_diameter_mm, center_distance_mm, touching_radius_mm }))
+        let limit_mm = self.touching_radius_mm(center_distance_mm)?;
+        let detail = format!(
+            "neighbouring teeth of {tooth_diameter_mm:?} mm diameter come as near as {center_distance_mm:?} mm from centre to centre: choose a radius below {limit_mm:?} mm, install fewer, or enlarge the wave generator"
+        );
+        let (code, parameter) = (FieldCode::TeethTouch, Parameter::ToothRadius);
+        Ok(Some(Violation::new(code, parameter, tooth_radius_mm, limit_mm, detail)))
     }
 
     /// Returns the least distance of two neighbouring centres on their path (docs/explanation/theory.md section 7). On

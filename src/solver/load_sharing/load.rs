@@ -9,7 +9,7 @@ use crate::mesh::Mesh;
 use crate::parts::CarrierRadii;
 use crate::ring::{FlankEnd, RingTooth};
 use crate::root::NotConverged;
-use crate::violation::{Parameter, Violation};
+use crate::violation::{FieldCode, Parameter, Violation};
 
 /// Torque that the drive transmits, ring fixed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,7 +94,7 @@ impl LoadParameters {
     pub fn deviation_violations(&self, drive: &DriveParameters, deviations: &Deviations) -> Vec<Violation> {
         let mut violations = deviations.violations(drive);
         if self.compatibility == Compatibility::Projection && !deviations.is_nil() {
-            violations.push(Violation::NeedsVirtualWork { parameter: Parameter::Deviations });
+            violations.push(Violation::needs_virtual_work(Parameter::Deviations));
         }
         violations
     }
@@ -122,7 +122,13 @@ impl LoadParameters {
         Ok(gaps
             .into_iter()
             .filter(|&(contact, _)| *weight.get(contact) < 0.0)
-            .map(|(contact, &clearance_um)| Violation::ClearanceNotMonotone { contact, clearance_um })
+            .map(|(contact, &clearance_um)| {
+                let detail = format!(
+                    "`projection` weighs this gap of {clearance_um:?} µm negatively at some position, so that it would load a tooth instead of freeing it: choose `virtual_work`, or no clearance of this part and of the teeth"
+                );
+                let parameter = Parameter::PartClearance(contact.mate());
+                Violation::new(FieldCode::ClearanceNotMonotone, parameter, clearance_um, 0.0, detail)
+            })
             .collect())
     }
 }
@@ -176,9 +182,7 @@ impl LoadCase {
         let mut violations: Vec<_> =
             values.into_iter().filter_map(|(parameter, value)| parameter.check(value)).collect();
         if parameters.compatibility == Compatibility::Projection {
-            violations.extend(
-                parameters.what_needs_virtual_work().map(|parameter| Violation::NeedsVirtualWork { parameter }),
-            );
+            violations.extend(parameters.what_needs_virtual_work().map(Violation::needs_virtual_work));
         }
         if violations.is_empty() { Ok(Self(*parameters)) } else { Err(violations) }
     }

@@ -15,7 +15,7 @@ use crate::ring_bending::RingBending;
 use crate::root::NotConverged;
 use crate::springs::{Springs, WindUp};
 use crate::tooth::{BallContact, Contacts, Flat, ToothContact, ToothLaw};
-use crate::violation::Violation;
+use crate::violation::{Parameter, Violation};
 
 /// A drive under a load, with everything precomputed that does not depend on the position.
 #[derive(Debug, Clone, Copy)]
@@ -78,7 +78,12 @@ impl<'a> LoadedDrive<'a> {
         let p = load.parameters();
         let size = ToothSize { radius_mm: drive.parameters().tooth_radius_mm, width_mm: drive.tooth_width_mm() };
         let contacts = Contacts::new(shape, &p.law, &p.materials, size, &p.series_compliance_mm_per_n)
-            .ok_or_else(|| SolveError::Impossible(vec![Violation::LawOfOtherTeeth]))?;
+            .ok_or_else(|| {
+                SolveError::Impossible(vec![Violation::conflict(
+                    Parameter::Law,
+                    "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have",
+                )])
+            })?;
         let mesh = load.mesh(drive, deviations.unwrap_or(&Deviations::default()));
         let tip_corner = if load.presses_corners(drive) { TipCorner::of(drive.ring_tooth())? } else { None };
         let loaded = Self {

@@ -1,4 +1,4 @@
-//! The table of the parameters: meaning, range and unit of each. Checks, messages and the API document read it.
+//! The table of the parameters: range, unit and field of each. Checks, messages and the API document read it.
 
 use super::Violation;
 use crate::contact::{Contact, Part};
@@ -56,7 +56,8 @@ pub const SHARES_TOLERANCE: f64 = 1e-6;
 /// Largest number of intervals of a sweep.
 pub const MAX_SAMPLES: i64 = 10_000_000;
 
-/// Makes an enum of lines `Name = range;`, with `Name(of: Kind)` for each part, contact or item.
+/// Makes an enum of lines `Name = range, "place in the design document";`, with `Name(of: Kind)` for each part, contact
+/// or item.
 macro_rules! table {
     (@each $name:ident) => { vec![Self::$name] };
     (@each $name:ident, $kind:ty) => { <$kind>::all().into_iter().map(Self::$name).collect() };
@@ -65,16 +66,20 @@ macro_rules! table {
     };
     (
         $(#[$about:meta])* $table:ident:
-        $($(#[$doc:meta])* $name:ident $(($of:tt: $kind:ty $(, $at:tt: $entry:ty)?))? = $range:expr;)+
+        $(
+            $(#[$doc:meta])*
+            $name:ident $(($of:ident: $kind:ty $(, $at:ident: $entry:ty)?))? = $range:expr, $path:literal;
+        )+
     ) => {
         $(#[$about])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum $table {
-            $($(#[$doc])* $name $(($kind $(, $entry)?))?),+
+            $(#[doc = concat!("`", $path, "`")] #[doc = ""] $(#[$doc])* $name $(($kind $(, $entry)?))?),+
         }
 
         impl $table {
             /// Returns the range and the unit.
+            #[allow(unused_variables, reason = "most ranges are the same for all parts")]
             pub const fn range(self) -> Range {
                 match self {
                     $(Self::$name $(($of $(, $at)?))? => $range),+
@@ -86,187 +91,124 @@ macro_rules! table {
                 [$(table!(@each $name $(, $kind $(, $entry)?)?)),+].concat()
             }
         }
+
+        /// Writes the place in the design document.
+        impl std::fmt::Display for $table {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                match self {
+                    $(Self::$name $(($of $(, $at)?))? => write!(f, $path)),+
+                }
+            }
+        }
     };
 }
 
 table! {
-    /// Parameter to which a violation can refer.
+    /// Parameter to which a violation can refer. Its text is the JSON pointer of its field.
     Parameter:
-    /// `a`: semi-major axis.
-    SemiMajor = Range::LENGTH;
-    /// `b`: semi-minor axis.
-    SemiMinor = Range::LENGTH;
-    /// Radius of an eccentric circle.
-    EccentricRadius = Range::LENGTH;
-    /// `e`: distance of its centre from the axis.
-    Eccentricity = Range::LENGTH;
-    /// `U`: number of lobes.
-    Lobes = Range::closed(1.0, MAX_LOBES as f64, "");
-    /// `U` of a harmonic support function, of which one lobe is an eccentric circle.
-    HarmonicLobes = Range::closed(2.0, MAX_LOBES as f64, "");
-    /// `R0` of a harmonic support function.
-    MeanRadius = Range::LENGTH;
-    /// `R` of a harmonic path.
-    MeanPathRadius = Range::LENGTH;
-    /// `e`: amplitude of either.
-    Amplitude = Range::LENGTH;
-    /// `Z_G`: theoretical number of teeth.
-    ToothCount = Range::TEETH;
-    /// `Z'_G`: number of installed teeth.
-    InstalledTeeth = Range::TEETH;
-    /// `r`: tooth radius.
-    ToothRadius = Range::LENGTH;
-    /// `L1`: tooth width.
-    ToothWidth = Range::LENGTH;
-    /// Radius of a ball's groove.
-    GrooveRadius(_: Contact) = Range::LENGTH;
-    /// `l`: length of a tooth's flat.
-    FlatLength = Range::LENGTH;
-    /// `Z_K`: number of ring teeth.
-    RingTeeth = Range::TEETH;
-    /// Tip-circle radius.
-    TipRadius = Range::LENGTH;
-    /// `E`: Young's modulus.
-    YoungsModulus(_: Part) = Range::closed(1e-3, 1e5, "GPa");
-    /// ν: Poisson's ratio.
-    PoissonsRatio(_: Part) = Range { low: -1.0, high: 0.5, closed: false, unit: "" };
-    /// `M0`: torque at the wave generator.
-    InputTorque = Range::TORQUE;
-    /// Torque at the carrier.
-    OutputTorque = Range::TORQUE;
-    /// Fixed stiffness.
-    Stiffness(_: Contact) = Range::closed(1e-3, 1e15, "N/mm");
-    /// The contact law.
-    Law = Range::NONE;
-    /// Bending of the ring's teeth, on or off.
-    RingTeethBend = Range::NONE;
-    /// Change of lever arms with wind-up, on or off.
-    WaveGeneratorMoves = Range::NONE;
-    /// Contact with the corners of the ring's tips, on or off.
-    CornerContact = Range::NONE;
-    /// Depth of the body at a contact.
-    Depth(_: Contact) = Range::LENGTH;
-    /// Series compliance of the support at a contact: as soft as the least stiffness, or zero.
-    SeriesCompliance(_: Contact) = Range::closed(0.0, 1e3, "mm/N");
-    /// Clearance along a contact's normal.
-    Clearance(_: Contact) = Range::GAP;
-    /// A value of the modification.
-    Modification(modified: Modified) = modified.range();
-    /// The deviations.
-    Deviations = Range::NONE;
-    /// A list of the deviations.
-    DeviationList(_: Listed) = Range::NONE;
-    /// An entry of a list of the deviations, counted from 0.
-    Deviation(listed: Listed, _: usize) = listed.range();
-    /// Runout of a part: distance from the axis.
-    RunoutAmount(_: Contact) = Range::GAP;
-    /// Direction of a part's runout.
-    RunoutAngle(_: Contact) = Range::closed(-360.0, 360.0, "deg");
-    /// Allowable stress of all contacts.
-    AllowableStress = Range::STRESS;
-    /// Allowable stress of a contact.
-    AllowableStressAt(_: Contact) = Range::STRESS;
-    /// `n`: speed of the wave generator.
-    InputSpeed = Range::SPEED;
-    /// A value of a point of the duty, counted from 0.
-    Duty(of: OfDutyPoint, _: usize) = of.range();
-    /// Number of points of the duty.
-    DutyPoints = Range::closed(1.0, MAX_DUTY_POINTS as f64, "");
-    /// μ: coefficient of friction at a contact.
-    FrictionCoefficient(_: Contact) = Range::FRICTION;
-    /// `μ_b`: coefficient of friction of the bearing between cam and race.
-    BearingCoefficient = Range::FRICTION;
-    /// `R_b`: radius of that bearing for its friction torque.
-    BearingRadius = Range::LENGTH;
-    /// `C`: dynamic load rating of that bearing.
-    BearingLoadRating = Range::closed(1e-3, 1e12, "N");
-    /// `w`: wear rate of a part at its contact with the teeth.
-    WearRate(_: Contact) = Range::closed(0.0, 1e3, "mm³/(N·m)");
-    /// Number of intervals of a sweep.
-    Samples = Range::closed(1.0, MAX_SAMPLES as f64, "");
-    /// Relative tolerance of a sweep.
-    SweepTolerance = Range::closed(1e-12, 0.1, "");
-    /// Requested relative error.
-    RequestedError = Range::closed(1e-12, 1.0, "");
-    /// Chord tolerance.
-    ChordTolerance = Range::LENGTH;
-    /// Outer radius of the ring.
-    RingOuterRadius = Range::LENGTH;
-    /// Inner radius of the carrier.
-    CarrierInnerRadius = Range::LENGTH;
-    /// Outer radius of the carrier.
-    CarrierOuterRadius = Range::LENGTH;
-    /// Radius of the fillet at a finger's foot.
-    FingerFilletRadius = Range::LENGTH;
-    /// `R_p`: yield strength of the carrier.
-    YieldStrength = Range::STRESS;
-    /// `R_m`: tensile strength of the carrier.
-    TensileStrength = Range::STRESS;
-    /// `σ_W`: endurance limit of the carrier.
-    EnduranceLimit = Range::STRESS;
-    /// Radius of the wave generator's bore.
-    BoreRadius = Range::LENGTH;
-    /// Clearance of a part: inward offset of its working surface.
-    PartClearance(_: Part) = Range::GAP;
-    /// Input angle of an assembly. At its ends the rounding of the angle is 2e-9 deg.
-    InputAngle = Range::closed(-1e7, 1e7, "deg");
+    SemiMajor = Range::LENGTH, "/drive/wave_generator/semi_major_mm";
+    SemiMinor = Range::LENGTH, "/drive/wave_generator/semi_minor_mm";
+    EccentricRadius = Range::LENGTH, "/drive/wave_generator/radius_mm";
+    Eccentricity = Range::LENGTH, "/drive/wave_generator/eccentricity_mm";
+    Lobes = Range::closed(1.0, MAX_LOBES as f64, ""), "/drive/wave_generator/lobes";
+    /// Of a harmonic support function, of which one lobe is an eccentric circle.
+    HarmonicLobes = Range::closed(2.0, MAX_LOBES as f64, ""), "/drive/wave_generator/lobes";
+    MeanRadius = Range::LENGTH, "/drive/wave_generator/mean_radius_mm";
+    MeanPathRadius = Range::LENGTH, "/drive/wave_generator/mean_path_radius_mm";
+    Amplitude = Range::LENGTH, "/drive/wave_generator/amplitude_mm";
+    ToothCount = Range::TEETH, "/drive/teeth/count";
+    InstalledTeeth = Range::TEETH, "/drive/teeth/installed";
+    ToothRadius = Range::LENGTH, "/drive/teeth/radius_mm";
+    ToothWidth = Range::LENGTH, "/drive/teeth/width_mm";
+    GrooveRadius(of: Contact) = Range::LENGTH, "/drive/teeth/groove_radius_mm/{of}";
+    FlatLength = Range::LENGTH, "/drive/teeth/flat_length_mm";
+    RingTeeth = Range::TEETH, "/drive/ring/teeth";
+    TipRadius = Range::LENGTH, "/drive/ring/tip_radius_mm";
+    YoungsModulus(of: Part) = Range::closed(1e-3, 1e5, "GPa"), "/materials/{of}/youngs_modulus_gpa";
+    PoissonsRatio(of: Part) = Range { low: -1.0, high: 0.5, closed: false, unit: "" }, "/materials/{of}/poissons_ratio";
+    InputTorque = Range::TORQUE, "/load/input_torque_nm";
+    OutputTorque = Range::TORQUE, "/load/output_torque_nm";
+    Stiffness(of: Contact) = Range::closed(1e-3, 1e15, "N/mm"), "/model/stiffness/{of}_n_per_mm";
+    Law = Range::NONE, "/model/stiffness/law";
+    RingTeethBend = Range::NONE, "/model/refinements";
+    WaveGeneratorMoves = Range::NONE, "/model/refinements";
+    CornerContact = Range::NONE, "/model/refinements";
+    Depth(of: Contact) = Range::LENGTH, "/model/stiffness/depth_mm/{of}";
+    /// As soft as the least stiffness, or zero.
+    SeriesCompliance(of: Contact) = Range::closed(0.0, 1e3, "mm/N"), "/model/series_compliance_mm_per_n/{of}";
+    Clearance(of: Contact) = Range::GAP, "/model/clearance/{of}_um";
+    Modification(of: Modified) = of.range(), "/modification/{of}";
+    Deviations = Range::NONE, "/deviations";
+    DeviationList(of: Listed) = Range::NONE, "/deviations/{of}";
+    /// Counted from 0.
+    Deviation(of: Listed, at: usize) = of.range(), "/deviations/{of}/{at}";
+    RunoutAmount(of: Contact) = Range::GAP, "/deviations/{of}_runout/amount_um";
+    RunoutAngle(of: Contact) = Range::closed(-360.0, 360.0, "deg"), "/deviations/{of}_runout/angle_deg";
+    /// Of all contacts.
+    AllowableStress = Range::STRESS, "/load/allowable_stress_mpa";
+    AllowableStressAt(of: Contact) = Range::STRESS, "/load/allowable_stress_mpa/{of}";
+    InputSpeed = Range::SPEED, "/load/input_speed_rpm";
+    /// Counted from 0.
+    Duty(of: OfDutyPoint, at: usize) = of.range(), "/load/duty/{at}/{of}";
+    /// Number of points.
+    DutyPoints = Range::closed(1.0, MAX_DUTY_POINTS as f64, ""), "/load/duty";
+    FrictionCoefficient(of: Contact) = Range::FRICTION, "/friction/{of}/coefficient";
+    BearingCoefficient = Range::FRICTION, "/friction/wave_generator/bearing_coefficient";
+    BearingRadius = Range::LENGTH, "/friction/wave_generator/bearing_radius_mm";
+    BearingLoadRating = Range::closed(1e-3, 1e12, "N"), "/friction/wave_generator/bearing_load_rating_n";
+    WearRate(of: Contact) = Range::closed(0.0, 1e3, "mm³/(N·m)"), "/friction/wear_rate_mm3_per_nm/{of}";
+    Samples = Range::closed(1.0, MAX_SAMPLES as f64, ""), "/sweep/samples";
+    SweepTolerance = Range::closed(1e-12, 0.1, ""), "/sweep/tolerance";
+    RequestedError = Range::closed(1e-12, 1.0, ""), "/accuracy/requested_error";
+    ChordTolerance = Range::LENGTH, "/profile/chord_tolerance_mm";
+    RingOuterRadius = Range::LENGTH, "/parts/ring/outer_radius_mm";
+    CarrierInnerRadius = Range::LENGTH, "/parts/carrier/inner_radius_mm";
+    CarrierOuterRadius = Range::LENGTH, "/parts/carrier/outer_radius_mm";
+    FingerFilletRadius = Range::LENGTH, "/parts/carrier/finger_fillet_radius_mm";
+    YieldStrength = Range::STRESS, "/parts/carrier/strength/yield_strength_mpa";
+    TensileStrength = Range::STRESS, "/parts/carrier/strength/tensile_strength_mpa";
+    EnduranceLimit = Range::STRESS, "/parts/carrier/strength/endurance_limit_mpa";
+    BoreRadius = Range::LENGTH, "/parts/wave_generator/bore_radius_mm";
+    PartClearance(of: Part) = Range::GAP, "/parts/{of}/clearance_um";
+    /// At the ends the rounding of the angle is 2e-9 deg.
+    InputAngle = Range::closed(-1e7, 1e7, "deg"), "/assembly/input_angle_deg";
 }
 
 table! {
     /// Value of a point of a duty.
     OfDutyPoint:
-    /// Torque at the wave generator.
-    InputTorque = Range::TORQUE;
-    /// Torque at the carrier.
-    OutputTorque = Range::TORQUE;
-    /// Speed of the wave generator.
-    InputSpeed = Range::SPEED;
-    /// Share of the running time.
-    ShareOfTime = Range::closed(1e-9, 1.0, "");
+    InputTorque = Range::TORQUE, "input_torque_nm";
+    OutputTorque = Range::TORQUE, "output_torque_nm";
+    InputSpeed = Range::SPEED, "input_speed_rpm";
+    ShareOfTime = Range::closed(1e-9, 1.0, ""), "share_of_time";
 }
 
 table! {
     /// Value of a modification.
     Modified:
-    /// Offset of the ring along its normals.
-    RingEquidistant = Range::OFFSET;
-    /// Shift of the ring's generating path.
-    RingPathShift = Range::OFFSET;
-    /// Shift of the ring's profile.
-    RingProfileShift = Range::OFFSET;
-    /// Rotation of the ring.
-    RingRotation = Range::ROTATION;
-    /// Offset of the wave generator.
-    WaveGeneratorEquidistant = Range::OFFSET;
-    /// Offset of the slots' walls.
-    SlotWall = Range::OFFSET;
-    /// Rotation of the carrier.
-    CarrierRotation = Range::ROTATION;
-    /// Reduction of the teeth's radius.
-    ToothRadius = Range::OFFSET;
-    /// Amount of tip relief at the flank's end.
-    TipReliefAmount = Range::OFFSET;
-    /// Start of the tip relief. A single lobe has its valley at 180 deg.
-    TipReliefStart = Range::closed(0.0, 180.0, "deg");
-    /// Power of the tip relief.
-    TipReliefPower = Range::closed(0.1, 100.0, "");
+    RingEquidistant = Range::OFFSET, "ring_equidistant_um";
+    RingPathShift = Range::OFFSET, "ring_path_shift_um";
+    RingProfileShift = Range::OFFSET, "ring_profile_shift_um";
+    RingRotation = Range::ROTATION, "ring_rotation_arcsec";
+    WaveGeneratorEquidistant = Range::OFFSET, "wave_generator_equidistant_um";
+    SlotWall = Range::OFFSET, "slot_wall_um";
+    CarrierRotation = Range::ROTATION, "carrier_rotation_arcsec";
+    ToothRadius = Range::OFFSET, "tooth_radius_um";
+    TipReliefAmount = Range::OFFSET, "ring_tip_relief/amount_um";
+    /// A single lobe has its valley at 180 deg.
+    TipReliefStart = Range::closed(0.0, 180.0, "deg"), "ring_tip_relief/start_deg";
+    TipReliefPower = Range::closed(0.1, 100.0, ""), "ring_tip_relief/power";
 }
 
 table! {
     /// List of deviations.
     Listed:
-    /// Reduction of the teeth's radius, by slot.
-    ToothRadius = Range::OFFSET;
-    /// Rotation of slots.
-    SlotAngle = Range::ROTATION;
-    /// Offset of the slots' walls.
-    SlotWall = Range::OFFSET;
-    /// Offset of ring spaces.
-    RingSpace = Range::OFFSET;
-    /// Rotation of ring spaces.
-    RingSpaceAngle = Range::ROTATION;
-    /// Offset of the wave generator's lobes.
-    WaveGeneratorLobe = Range::OFFSET;
+    ToothRadius = Range::OFFSET, "tooth_radius_um";
+    SlotAngle = Range::ROTATION, "slot_angle_arcsec";
+    SlotWall = Range::OFFSET, "slot_wall_um";
+    RingSpace = Range::OFFSET, "ring_space_um";
+    RingSpaceAngle = Range::ROTATION, "ring_space_angle_arcsec";
+    WaveGeneratorLobe = Range::OFFSET, "wave_generator_lobe_um";
 }
 
 impl Modified {
@@ -291,6 +233,6 @@ impl Parameter {
     /// Returns the violation of the parameter's range by `value`, if there is one.
     pub fn check(self, value: f64) -> Option<Violation> {
         let limit = self.range().limit_exceeded_by(value)?;
-        Some(Violation::OutOfRange { parameter: self, value, limit })
+        Some(Violation::out_of_range(self, value, limit))
     }
 }

@@ -204,6 +204,37 @@ pub(super) fn largest(values: &[f64]) -> f64 {
     largest
 }
 
+/// Returns the largest product of non-negative values in two columns.
+#[inline(always)]
+pub(super) fn largest_product(values: &[f64], factors: &[f64]) -> f64 {
+    let (stretches, rest) = values.as_chunks::<{ 2 * VECTOR }>();
+    let (by_stretch, by_rest) = factors.as_chunks::<{ 2 * VECTOR }>();
+    let mut most = [0.0; 2 * VECTOR];
+    for (values, factors) in stretches.iter().zip(by_stretch) {
+        for i in 0..2 * VECTOR {
+            let product = values[i] * factors[i];
+            most[i] = if product > most[i] { product } else { most[i] };
+        }
+    }
+    for (i, (value, factor)) in rest.iter().zip(by_rest).enumerate() {
+        let product = value * factor;
+        most[i] = if product > most[i] { product } else { most[i] };
+    }
+    largest(&most)
+}
+
+/// Returns the index of the first product of values in two columns that reaches `least`. It tests whole stretches,
+/// since a search that ends at a value cannot be vectorised.
+#[inline(always)]
+pub(super) fn first_product(values: &[f64], factors: &[f64], least: f64) -> Option<usize> {
+    let reaches = |(value, factor): (&f64, &f64)| value * factor >= least;
+    let stretches = values.chunks(2 * VECTOR).zip(factors.chunks(2 * VECTOR));
+    let mut stretches = stretches.map(|(values, factors)| values.iter().zip(factors));
+    let stretch = stretches.position(|stretch| stretch.fold(false, |any, pair| any | reaches(pair)))?;
+    let start = stretch * 2 * VECTOR;
+    values[start..].iter().zip(&factors[start..]).position(reaches).map(|at| start + at)
+}
+
 /// Repeats each value in a row, the last one up to the end of its chunk. Whole vectors are written, and the next value
 /// overwrites the excess; the last needs extra space.
 #[inline(always)]

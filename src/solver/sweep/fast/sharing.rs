@@ -223,18 +223,17 @@ fn start_above(excess_alone: f64, weight: impl Fn(usize) -> f64, closing: &[f64]
 /// Computes the rotation of each tooth beyond closure at the rotation of its row.
 #[inline(always)]
 fn press<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>) {
-    let rows = teeth.rows;
-    repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
-    let len = teeth.len;
-    let (excess, pressed) = (&work.excess[..len], &mut work.pressed[..len]);
+    let (rows, len) = (teeth.rows, teeth.len);
     if GAPS {
+        repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
         repeat_each(&work.row_last[..rows], teeth.count, work.last);
+        let (excess, pressed) = (&work.excess[..len], &mut work.pressed[..len]);
         let (last, closing) = (&work.last[..len], &work.closing[..len]);
         for i in 0..len {
             pressed[i] = excess[i] + (last[i] - closing[i]);
         }
     } else {
-        pressed.copy_from_slice(excess);
+        repeat_each(&work.row_excess[..rows], teeth.count, work.pressed);
     }
 }
 

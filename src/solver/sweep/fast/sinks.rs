@@ -3,7 +3,7 @@
 use std::iter::zip;
 use std::ops::Range;
 
-use super::lanes::{largest, repeat_each};
+use super::lanes::{first_product, largest, largest_product, repeat_each};
 use super::laps::{LapTeeth, Laps, Listed, Stretch, whole};
 use super::tile::Tile;
 use crate::contact::{Contact, PerContact};
@@ -278,30 +278,21 @@ impl Sink for PeakSink {
         let (count, rows) = (tile.count, tile.count / teeth);
         self.angles.take(drive, tile, rows);
         for contact in Contact::all() {
-            scale(tile.force.get_mut(contact), tile.scale, count);
-            let is_one = tile.stress_exponents.is_one_at(contact);
-            scale(tile.stress.get_mut(contact), if is_one { tile.scale } else { tile.scale_root }, count);
-            for (peak, is_stress) in self.peaks.get_mut(contact).iter_mut().zip([false, true]) {
-                let column = if is_stress { tile.stress.get(contact) } else { tile.force.get(contact) };
-                let value = largest(&column[..count]);
+            let (force, scale) = (&tile.force.get(contact)[..count], &tile.scale[..count]);
+            let (stress, root) = (&tile.stress.get(contact)[..count], &tile.stress_scale(contact)[..count]);
+            for (peak, (unit, factor)) in zip(self.peaks.get_mut(contact), [(force, scale), (stress, root)]) {
+                let value = largest_product(unit, factor);
                 if value > peak.value {
-                    let at = column[..count].iter().position(|&found| found >= value).unwrap_or(0);
+                    let at = first_product(unit, factor, value).unwrap_or(0);
                     *peak = PlacedPeak {
                         value,
                         input_angle_deg: tile.row_input_angle_deg[at / teeth],
                         position_deg: tile.position_deg_of(at),
-                        force_n: tile.force.get(contact)[at],
+                        force_n: force[at] * scale[at],
                     };
                 }
             }
         }
-    }
-}
-
-#[inline(always)]
-fn scale(column: &mut [f64], factor: &[f64], count: usize) {
-    for (value, factor) in zip(&mut column[..count], factor) {
-        *value *= factor;
     }
 }
 

@@ -201,20 +201,20 @@ impl<L: TwoParts> NoPowerLaw<L> {
             };
         }
         press::<GAPS>(teeth, work);
-        Self::guess::<V>(teeth, work, force);
+        Self::guess::<V, GAPS>(teeth, work, force);
         true
     }
 
     /// Estimates the forces from the displacements of the teeth.
     #[inline(always)]
-    fn guess<V: Simd>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) {
+    fn guess<V: Simd, const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) {
         let len = teeth.len;
         let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
         let pressed = &work.pressed[..len];
         let (excess, force) = (&work.excess[..len], &mut force[..len]);
         for i in 0..len {
             // An open tooth is treated as closed, because it may turn out to carry.
-            let pressed = if pressed[i] > 0.0 { pressed[i] } else { excess[i] };
+            let pressed = if !GAPS || pressed[i] > 0.0 { pressed[i] } else { excess[i] };
             let first = pressed * arm[i] / L::over_force_roughly::<V>(a[i], b[i], 1.0);
             let second = pressed * arm[i] / L::over_force_roughly::<V>(a[i], b[i], positive(first));
             force[i] = if second > NOTHING { second } else { NOTHING };
@@ -255,7 +255,7 @@ impl<L: TwoParts> NoPowerLaw<L> {
         if !turn_to_limit(teeth, work) {
             return None;
         }
-        Self::guess::<V>(teeth, work, limit);
+        Self::guess::<V, true>(teeth, work, limit);
         let mut is_done = false;
         for _ in 0..MAX_ROUNDS {
             Self::tangents::<V, true>(teeth, work, limit);
@@ -343,14 +343,15 @@ impl<L: TwoParts> NoPowerLaw<L> {
         }
     }
 
-    /// Updates the forces to the new rotations. Returns true if that was the last step.
+    /// Updates the forces to the new rotations, and stores the former ones in place of the secants. Returns true if that
+    /// was the last step.
     #[inline(always)]
     fn follow<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
         let len = teeth.len;
         // A tooth that was pressed before has a slope.
         press::<GAPS>(teeth, work);
         let (arm, pressed, slope) = (&teeth.arm[..len], &work.pressed[..len], &work.slope[..len]);
-        let (secant, offset) = (&work.secant[..len], &mut work.offset[..len]);
+        let (secant, offset) = (&mut work.secant[..len], &work.offset[..len]);
         let force = &mut force[..len];
         let mut beyond = [0.0; LANES];
         for start in (0..len).step_by(LANES) {
@@ -367,9 +368,8 @@ impl<L: TwoParts> NoPowerLaw<L> {
                 let has_changed = GAPS && is_pressed != (slope[i] > 0.0) && arm[i] > 0.0;
                 let step = (next - before).abs() - LAST_FORCE_STEP * before - f64::EPSILON * f64::EPSILON;
                 let step = if has_changed { 1.0 } else { step };
-                // Change of the slope along the step.
-                offset[i] *= (next - before) / (before * before);
                 force[i] = next;
+                secant[i] = before;
                 *beyond = if step > *beyond || step.is_nan() { step } else { *beyond };
             }
         }
@@ -380,8 +380,13 @@ impl<L: TwoParts> NoPowerLaw<L> {
     /// law allows.
     #[inline(always)]
     fn finish(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
-        let (count, arm) = (teeth.count, &teeth.arm[..teeth.len]);
-        let (slope, change) = (&work.slope[..teeth.len], &work.offset[..teeth.len]);
+        let (count, len) = (teeth.count, teeth.len);
+        let (arm, force, before) = (&teeth.arm[..len], &shared.force[..len], &work.secant[..len]);
+        let (slope, change) = (&work.slope[..len], &mut work.offset[..len]);
+        // Change of the slopes along the last step.
+        for i in 0..len {
+            change[i] *= (force[i] - before[i]) / (before[i] * before[i]);
+        }
         for row in 0..teeth.rows {
             let mut stiffness = 0.0;
             for i in row * count..(row + 1) * count {
