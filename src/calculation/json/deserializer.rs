@@ -35,7 +35,7 @@ impl<'de> serde::Deserializer<'de> for &Tree {
         }
     }
 
-    /// A field may be left out but not be null, except with [`or_null`](super::or_null).
+    /// A field may be left out but not be null, except with `or_null`.
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
         visitor.visit_some(self)
     }
