@@ -31,21 +31,30 @@ pub(crate) fn id(
         );
     }
     // The base is hashed as the designs at both ends of all ranges. The values that the study replaces do not count.
+    let spread = |variable: &Variable| match document {
+        StudyDocument::Tolerance(study) => {
+            study.inputs.get(&variable.pointer).and_then(|drawn| drawn.limit.or(drawn.sigma)).unwrap_or_default()
+        }
+        _ => 0.0,
+    };
     let end = |is_low: bool| {
         move |variable: &Variable| match variable.domain {
-            Domain::Real { min, max } | Domain::Whole { min, max } => Some(if is_low { min } else { max }),
+            Domain::Real { min, max } | Domain::Whole { min, max } => {
+                Some(if is_low { min } else { max + spread(variable) })
+            }
             Domain::OneOf(_) => None,
         }
     };
-    let designs = template.examples_at(end(true)).chain(template.examples_at(end(false)));
+    let designs: Vec<_> = template.examples_at(end(true)).chain(template.examples_at(end(false))).collect();
     let draws_deviations = matches!(document, StudyDocument::Tolerance(study) if !study.deviations.is_empty());
-    let is_only_drive =
-        !draws_deviations && !template.varies_within(&["/drive", "/parts", "/modification", "/deviations", "/model"]);
-    let in_one_spelling = |design: Tree| match design.read::<Design>() {
+    let is_same = |name: &str| designs.iter().all(|design| design.at(&[name]) == designs[0].at(&[name]));
+    let of_drive = ["drive", "parts", "modification", "deviations", "model"];
+    let is_only_drive = !draws_deviations && of_drive.into_iter().all(is_same);
+    let in_one_spelling = |design: &Tree| match design.read::<Design>() {
         Ok(read) => tree_of(&read.normalised().with_defaults().in_one_spelling(is_only_drive)),
-        Err(_) => Ok(design),
+        Err(_) => Ok(design.clone()),
     };
-    let mut parts = designs.map(|design| hash_of(&in_one_spelling(design)?)).collect::<Result<Vec<_>, _>>()?;
+    let mut parts = designs.iter().map(|design| hash_of(&in_one_spelling(design)?)).collect::<Result<Vec<_>, _>>()?;
     parts.push(hash_of(&asked)?);
     let within = format!("{} states, {} points", limits.max_states, limits.max_profile_points);
     Ok(Key::new("study", &parts.join(" ").as_str(), &within.as_str()))

@@ -82,6 +82,24 @@ fn returned_model_keeps_the_id_for_one_drive() {
     assert_ne!(short.id(), long.id());
 }
 
+/// Otherwise one study would be answered with the numbers of the other.
+#[test]
+fn default_that_follows_an_input_is_another_study() {
+    let [base, ..] = examples();
+    let base = with(&base, "/model", json!({}));
+    let swept = Sweep.ask(base.to_string().as_bytes(), &CALCULATION, &Never).unwrap();
+    let model = serde_json::to_value(&swept.model).unwrap();
+    let of = |base: Value, pointer: &str| {
+        let drawn = json!({ "distribution": "uniform", "limit": 0.01 });
+        json!({ "study": "tolerance", "base": base, "inputs": { pointer: drawn }, "samples": 10, "quantities": ["peak_force_n"] })
+    };
+    for (name, pointer) in [("stiffness", "/drive/teeth/radius_mm"), ("refinements", "/parts/ring/clearance_um")] {
+        let written = with(&base, "/model", json!({ name: model[name] }));
+        let ids = [base.clone(), written].map(|base| study(&of(base, pointer)).unwrap().id());
+        assert_ne!(ids[0], ids[1], "{name}");
+    }
+}
+
 #[test]
 fn strength_by_name_is_its_numbers() {
     let [base, ..] = examples();
