@@ -73,12 +73,9 @@ async fn wait_preference_may_have_any_length() {
 }
 
 #[tokio::test]
-async fn study_without_wait_has_status_and_events() {
+async fn events_end_with_the_final_state() {
     let service = Service::new();
-    let answer = start_study(&service, &map(&shortest(), 5)).await;
-    assert_eq!(answer.status, 202, "{}", answer.text());
-    let study = answer.json();
-    assert_eq!(format!("/v1/{}", answer.header("location")), place(&study));
+    let study = start_study(&service, &map(&shortest(), 5)).await.json();
     let events = service.get(study["events_href"].as_str().unwrap()).await;
     assert_eq!((events.status, events.header("content-type")), (200, "text/event-stream"));
     let last = events.text().trim_end().rsplit("\n\n").next().unwrap();
@@ -92,7 +89,10 @@ async fn study_without_wait_has_status_and_events() {
 #[tokio::test]
 async fn first_event_comes_at_once_and_comments_follow() {
     let service = Service::within(ENDLESS);
-    let study = start_study(&service, &slow(2)).await.json();
+    let answer = start_study(&service, &slow(2)).await;
+    assert_eq!(answer.status, 202, "{}", answer.text());
+    let study = answer.json();
+    assert_eq!(format!("/v1/{}", answer.header("location")), place(&study));
     let mut events = service.send(&Question::of("GET", study["events_href"].as_str().unwrap()));
     let (mut read, mut buffer) = (String::new(), [0; 4096]);
     // A comment is a line that begins with a colon (HTML Living Standard, section 9.2).
