@@ -17,11 +17,9 @@ pub struct FieldError {
     pub detail: String,
     /// Value of the field, if it is a number.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub value: Option<f64>,
     /// The violated limit. For a number of teeth or entries, the nearest valid number.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub limit: Option<f64>,
 }
 

@@ -6,7 +6,7 @@ use toothwave_solver::drive::Draft;
 use toothwave_solver::{LoadCase, Parameter, Part, SolveError, Violation, model_error};
 pub use toothwave_solver::{Never, Stop};
 
-use crate::design::{Design, PartsDocument, SeriesComplianceDocument};
+use crate::design::{Design, PartsDocument, SeriesComplianceDocument, TeethDocument};
 use crate::forms::{Format, Forms};
 use crate::key::Key;
 use crate::no_answer::NoAnswer;
@@ -127,7 +127,8 @@ pub(crate) fn checked_load(
     violations.extend(draft.drive().and_then(|drive| parameters.modification.violation_in(&drive)));
     violations.extend(parameters.carrier_violations(draft));
     for violation in violations_of_supports(design, draft)? {
-        if !violations.contains(&violation) {
+        let is_listed = |listed: &Violation| (listed.code, listed.parameter) == (violation.code, violation.parameter);
+        if !violations.iter().any(is_listed) {
             violations.push(violation);
         }
     }
@@ -139,9 +140,10 @@ pub(crate) fn checked_load(
 fn violations_of_supports(design: &Design, draft: &Draft) -> Result<Vec<Violation>, NoAnswer> {
     let PartsDocument { ring, carrier, .. } = &design.parts;
     let is_estimated = design.model.series_compliance_mm_per_n == SeriesComplianceDocument::Estimated;
+    let has_strength = carrier.strength.is_some() && !matches!(design.drive.teeth, TeethDocument::Ball(_));
     let has_carrier_radius = carrier.inner_radius_mm.or(carrier.outer_radius_mm).is_some();
     let asked = [
-        (Part::Carrier, has_carrier_radius && (is_estimated || carrier.strength.is_some())),
+        (Part::Carrier, has_carrier_radius && (is_estimated || has_strength)),
         (Part::Ring, ring.outer_radius_mm.is_some() && is_estimated),
     ];
     let parts = design.parts_parameters()?;

@@ -36,7 +36,7 @@ pub struct Modification {
     /// Reduction of the teeth's radius, in µm. Default: 0 µm.
     pub tooth_radius_um: f64,
     /// Tip relief: offset of the ring's flank towards its tip. Default: no relief.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub ring_tip_relief: Option<TipRelief>,
 }
 

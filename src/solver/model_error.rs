@@ -194,7 +194,7 @@ pub struct Held {
     /// Support of the parts, from `parts`.
     pub case: HeldCase,
     /// Error found in earlier calculations of elastic bodies held so; left out if there were none.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub wind_up: Option<ErrorRange>,
     /// Estimated error from this design's own parts, relative to the wind-up that the load adds to that of the gaps.
     pub estimated_wind_up: f64,
@@ -276,11 +276,11 @@ impl MeasuredRange {
 #[non_exhaustive]
 pub struct ModelError {
     /// Errors of the case; left out if the law was not measured.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub measured: Option<Measured>,
     /// Additional wind-up error from the compliance behind the contacts, for cylinders under `virtual_work` with
     /// `johnson`.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub held: Option<Held>,
     /// Range of the calculated drives.
     pub range: MeasuredRange,

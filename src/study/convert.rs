@@ -28,7 +28,8 @@ fn convert_study(tree: &mut Tree) -> Result<(), Fault> {
     for (list, pointers) in fields.iter_mut().filter(|(name, _)| LISTS_OF_POINTERS.contains(&&**name)) {
         let Tree::Object(pointers) = pointers else { continue };
         for (pointer, _) in pointers {
-            let new = converted_pointer(pointer).map_err(|found| found.within(list))?;
+            let new = converted_pointer(pointer)
+                .map_err(|found| Fault { pointer: String::new(), ..found }.within(pointer).within(list))?;
             if new != *pointer {
                 renamed.push((std::mem::replace(pointer, new.clone()), new));
             }

@@ -35,6 +35,8 @@ pub(crate) fn id(
         StudyDocument::Tolerance(study) => {
             study.inputs.get(&variable.pointer).and_then(|drawn| drawn.limit.or(drawn.sigma)).unwrap_or_default()
         }
+        // The step of a count is a whole number at least, while its range is rounded inward.
+        StudyDocument::Sensitivity(_) if matches!(variable.domain, Domain::Whole { .. }) => 1.0,
         _ => 0.0,
     };
     let end = |is_low: bool| {

@@ -87,8 +87,8 @@ impl SearchDocument {
         if at("/parts/carrier/strength").is_some() && !is_ball {
             let limit = RangeDocument { min: Some(FINGER_SAFETY), max: None };
             let limit = document.require.entry("finger_safety".into()).or_insert(RequireDocument::Range(limit));
-            if let RequireDocument::Range(RangeDocument { min, .. }) = limit {
-                min.get_or_insert(FINGER_SAFETY);
+            if let RequireDocument::Range(RangeDocument { min: min @ None, max: Some(FINGER_SAFETY..) }) = limit {
+                *min = Some(FINGER_SAFETY);
             }
         }
         document

@@ -326,13 +326,12 @@ impl Template {
             };
             form.tree.set(&variable.path, value);
         }
-        form.derive();
-        if base.at(&LAW[..2]).is_none() {
-            form.name_law_of_numbers();
-        }
         let mut left_out = 0;
         loop {
             form.derive();
+            if base.at(&LAW[..2]).is_none() {
+                form.name_law_of_numbers();
+            }
             let Err(found) = form.tree.read::<Design>() else { return Ok(form) };
             // A field of another kind, shape or law. Whether it exists at all is known after all forms are made.
             let is_of_choice = self.variables.iter().filter(|variable| !variable.choices.is_empty()).any(|variable| {

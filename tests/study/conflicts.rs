@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::asking::{faulty, paper, with};
+use crate::asking::{answer, faulty, paper, with};
 
 /// Returns a map and a search that vary a field and the radius of the teeth, for a quantity that needs no load.
 fn studies(base: &Value, pointer: &str) -> [Value; 2] {
@@ -38,6 +38,20 @@ fn conflict_is_refused_for_quantities_without_load_too() {
         assert_eq!(faulty(&map), (at.replace("/free", "/over"), "conflicting_fields".into()), "{map}");
         assert_eq!(faulty(&search), (at.into(), "conflicting_fields".into()), "{search}");
     }
+}
+
+/// The default law follows the teeth: `projection` takes that of cylinders, not that of balls.
+#[test]
+fn conflict_of_some_shapes_refuses_no_study() {
+    let base = with(
+        &with(&paper(), "/model", json!({ "compatibility": "projection" })),
+        "/drive/teeth",
+        json!({ "count": 28, "radius_mm": 5.0 }),
+    );
+    let over = json!({ "/drive/teeth/shape": { "one_of": ["cylinder", "ball"] }, "/drive/teeth/width_mm": { "one_of": [15.0] } });
+    let map = json!({ "study": "map", "base": base, "over": over, "quantities": ["peak_force_n"] });
+    let found = answer(&map);
+    assert_eq!(found["impossible"]["variant"], json!([1]), "{found}");
 }
 
 /// Otherwise the row of 0 would have the gap of the other field.

@@ -98,6 +98,15 @@ fn default_that_follows_an_input_is_another_study() {
         let ids = [base.clone(), written].map(|base| study(&of(base, pointer)).unwrap().id());
         assert_ne!(ids[0], ids[1], "{name}");
     }
+    let of_count = |base: Value| {
+        let count = json!({ "/drive/teeth/count": { "relative": 0.001 } });
+        json!({ "study": "sensitivity", "base": base, "inputs": count, "quantities": ["transmission_ratio"] })
+    };
+    let written = with(&base, "/drive/teeth/installed", base["drive"]["teeth"]["count"].clone());
+    let mut short = base;
+    short["drive"]["teeth"].as_object_mut().unwrap().remove("installed");
+    let ids = [short, written].map(|base| study(&of_count(base)).unwrap().id());
+    assert_ne!(ids[0], ids[1]);
 }
 
 #[test]
@@ -145,6 +154,10 @@ fn left_out_law_has_its_numbers() {
     for (short, long) in of(&short).iter().zip(&of(&long)) {
         assert_same_id(short, long);
     }
+    // Also where a shape drops a field that varies.
+    let range = json!({ "min": 2, "max": 3, "steps": 2 });
+    let over = json!({ depth: range, "/drive/teeth/flat_length_mm": range, "/drive/teeth/shape": { "one_of": ["cylinder", "flat_sided"] } });
+    study(&json!({ "study": "map", "base": short, "over": over })).unwrap();
 }
 
 #[test]
@@ -237,17 +250,24 @@ fn all_whole_steps_written_out_keep_the_id() {
 
 #[test]
 fn derived_free_fields_written_out_keep_the_id() {
-    let search = json!({
-        "study": "search", "base": { "load": { "output_torque_nm": 200.0 } }, "evaluations": 100,
-        "require": { "transmission_ratio": { "min": 19.5, "max": 20.5 }, "outer_diameter_mm": { "max": 120.0 } },
-        "objectives": [{ "quantity": "outer_diameter_mm", "goal": "min" }]
-    });
+    let short = json!({ "load": { "output_torque_nm": 200.0 } });
+    let long = with(&short, "/drive", json!({ "wave_generator": { "kind": "harmonic_path", "lobes": 2 } }));
+    let of = |base: Value| {
+        json!({
+            "study": "search", "base": base, "evaluations": 100,
+            "require": { "transmission_ratio": { "min": 19.5, "max": 20.5 }, "outer_diameter_mm": { "max": 120.0 } },
+            "objectives": [{ "quantity": "outer_diameter_mm", "goal": "min" }]
+        })
+    };
+    let search = of(short);
+    assert_same_id(&search, &of(long.clone()));
     let found = answer(&search);
     let range = |free: &Value| {
         (free["pointer"].as_str().unwrap().to_owned(), json!({ "min": free["min"], "max": free["max"] }))
     };
     let free: Map<_, _> = found["free"].as_array().unwrap().iter().map(range).collect();
     assert_same_id(&search, &with(&search, "/free", json!(free)));
+    assert_same_id(&search, &with(&of(long), "/free", json!(free)));
 }
 
 #[test]

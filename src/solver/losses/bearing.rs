@@ -37,10 +37,10 @@ pub struct BearingLife {
     /// Life in millions of revolutions of one ring relative to the other.
     pub life_million_revolutions: f64,
     /// Relative speed of the bearing's rings with the ring of the drive fixed, given a speed.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub speed_rpm: Option<f64>,
     /// The life in hours, given a speed.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub life_h: Option<f64>,
 }
 

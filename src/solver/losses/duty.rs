@@ -93,24 +93,24 @@ pub struct LossTotals {
     /// Loss ratio at each place; the entries add up to the total.
     pub loss_ratio_by_place: LossByPlace,
     /// Mean power lost with the ring fixed, given a speed.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub power_loss_w: Option<f64>,
     /// Power lost at each place, in W; the entries add up to the total.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub power_loss_by_place_w: Option<LossByPlace>,
     /// Largest product of Hertz stress and slip of each contact, ring fixed, in MPa m/s, given a speed. Limits in
     /// handbooks refer to the load over the projected area, which is far less: do not compare the two.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub pressure_velocity_mpa_m_per_s: Option<PerContact<Peak>>,
     /// Largest depth that each part loses per hour where a tooth touches it, ring fixed, given
     /// `friction.wear_rate_mm3_per_nm` and a speed. Given `deviations` it is an upper bound: every passing tooth is
     /// taken to carry as much as the tooth with the largest load. A race wears evenly around its circumference and has
     /// its true mean.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub wear_mm_per_hour: Option<PerContact<WornPlace>>,
     /// Load and life of the bearing that is the eccentric, given its `bearing_load_rating_n`. Left out if the bearing
     /// does not turn.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub bearing: Option<BearingLife>,
 }
 

@@ -27,10 +27,10 @@ pub struct WornPlace {
     pub value: f64,
     /// Input angle at which a tooth touches the part there. A race wears evenly around its circumference and has no
     /// place.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub input_angle_deg: Option<f64>,
     /// Position of that tooth, from the middle of its lobe.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub position_deg: Option<f64>,
 }
 

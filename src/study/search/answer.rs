@@ -25,7 +25,8 @@ pub struct SearchAnswer {
     pub build: &'static str,
     /// True if every variant is computed.
     pub is_complete: bool,
-    /// Number of computed variants.
+    /// Number of evaluated variants. If a variant is worse than known ones by its geometry alone, its load is not
+    /// calculated.
     pub evaluated: u64,
     /// The free fields.
     pub free: Vec<FreeAnswer>,

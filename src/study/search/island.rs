@@ -108,7 +108,8 @@ impl Island {
         };
         let values: Vec<Value> = variable_values(&self.template, &place);
         // The scan counts the violations of all limits.
-        let is_hopeless = |values: &[f64]| !is_scanning && self.optimiser.is_hopeless(&search.least_judged(values));
+        let is_hopeless =
+            |values: &dyn Fn() -> Vec<f64>| !is_scanning && self.optimiser.is_hopeless(&search.least_judged(&values()));
         let outcome = match evaluator.outcome_unless(is_hopeless, self.template.filled(&values), stop) {
             Ok(outcome) => outcome.with_all(&evaluator.quantities),
             Err(interrupted) => {

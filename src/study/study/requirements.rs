@@ -236,8 +236,10 @@ fn is_of_base(template: &Template, example: &Tree, error: &FieldError) -> bool {
             Some(Tree::Array(_)) => !template.varies_within(&[&error.pointer]),
             _ => false,
         },
-        // `projection` rejects parts of the model whatever the drive.
-        FieldCode::ConflictingFields if error.pointer.starts_with("/model/") => !template.varies_within(&["/model"]),
+        // What `projection` rejects depends on the model, whose default law follows the teeth.
+        FieldCode::ConflictingFields if error.pointer.starts_with("/model/") => {
+            !template.varies_within(&["/model", "/drive/teeth/shape"])
+        }
         FieldCode::ConflictingFields => !template.varies_within(&[
             "/drive",
             "/load",

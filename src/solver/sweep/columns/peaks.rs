@@ -31,14 +31,14 @@ pub struct ContactPeaks {
     /// Half the width of the contact, in the plane of motion, where the stress has its peak.
     pub half_width_mm: f64,
     /// Half the length of the contact along the axis at the stress peak, in mm. Only for balls.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub half_length_mm: Option<f64>,
     /// Largest shear stress below the surface at the stress peak, in MPa. Left out for a flat, whose edges are not
     /// modelled.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub shear_stress_mpa: Option<f64>,
     /// Depth of that shear stress below the surface, in mm.
-    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"), schema(nullable = false))]
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
     pub shear_depth_mm: Option<f64>,
 }
 
