@@ -6,7 +6,6 @@ use toothwave_solver::{SolveError, Violation};
 use utoipa::ToSchema;
 
 use crate::field::{FieldCode, FieldError};
-use crate::json::Fault;
 
 /// Reason why a document has no answer.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,14 +110,6 @@ impl std::fmt::Display for NoAnswer {
 }
 
 impl std::error::Error for NoAnswer {}
-
-impl From<Fault> for NoAnswer {
-    fn from(Fault { pointer, code, detail }: Fault) -> Self {
-        let text = if pointer.is_empty() { detail.clone() } else { format!("{pointer}: {detail}") };
-        let error = FieldError { pointer, code, detail, value: None, limit: None };
-        Self::at_fields(NoAnswerCode::InvalidDocument, text, vec![error])
-    }
-}
 
 impl From<DriveError> for NoAnswer {
     fn from(error: DriveError) -> Self {

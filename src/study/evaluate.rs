@@ -63,7 +63,7 @@ pub struct Stopped;
 /// Reason for missing values.
 enum NoValues {
     Stopped,
-    Hopeless,
+    CannotImprove,
     NoAnswer(NoAnswer),
 }
 
@@ -107,25 +107,25 @@ impl Evaluator {
         self.outcome_unless(|_| false, document, stop)
     }
 
-    /// Returns the outcome of a document. If its drive is hopeless, it is refused before the load is calculated.
-    /// `is_hopeless` can ask for the quantities, NaN for those that need a load.
+    /// Returns the outcome of a document. If its drive cannot improve the search, it is refused before the load is calculated.
+    /// `cannot_improve` can ask for the quantities, NaN for those that need a load.
     pub(crate) fn outcome_unless(
         &self,
-        is_hopeless: impl Fn(&dyn Fn() -> Vec<f64>) -> bool,
+        cannot_improve: impl Fn(&dyn Fn() -> Vec<f64>) -> bool,
         document: &Tree,
         stop: &dyn Stop,
     ) -> Result<Outcome, Stopped> {
-        caught(|| match self.answer(&is_hopeless, document, stop) {
+        caught(|| match self.answer(&cannot_improve, document, stop) {
             Ok(values) => Ok(Outcome::Answered(values)),
             Err(NoValues::Stopped) => Err(Stopped),
-            Err(NoValues::Hopeless) => Ok(Outcome::Refused(Refusal::not_calculated(String::new()))),
+            Err(NoValues::CannotImprove) => Ok(Outcome::Refused(Refusal::not_calculated(String::new()))),
             Err(NoValues::NoAnswer(reason)) => Ok(Outcome::Refused(reason.into())),
         })
     }
 
     fn answer(
         &self,
-        is_hopeless: &impl Fn(&dyn Fn() -> Vec<f64>) -> bool,
+        cannot_improve: &impl Fn(&dyn Fn() -> Vec<f64>) -> bool,
         document: &Tree,
         stop: &dyn Stop,
     ) -> Result<Vec<f64>, NoValues> {
@@ -138,8 +138,8 @@ impl Evaluator {
         let checked = Sweep.check(&design, &self.limits)?.without_wear();
         let drive = checked.drive();
         let ring_outer_radius_mm = self.ring_outer_radius_mm(&design, drive)?;
-        if is_hopeless(&|| self.values_of_drive(&Variant { drive, ring_outer_radius_mm, loaded: None })) {
-            return Err(NoValues::Hopeless);
+        if cannot_improve(&|| self.values_of_drive(&Variant { drive, ring_outer_radius_mm, loaded: None })) {
+            return Err(NoValues::CannotImprove);
         }
         let takes_columns = self.takes_losses || self.takes_radial_forces;
         let loaded = self.loaded(&checked, takes_columns, stop)?;

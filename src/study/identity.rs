@@ -1,11 +1,12 @@
 //! Identity of a study.
 
 use toothwave_calculation::design::Design;
-use toothwave_calculation::json::{self, Tree, path};
+use toothwave_calculation::json::Tree;
 use toothwave_calculation::key::Key;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::question;
 
+use crate::defaults::tree_of;
 use crate::document::StudyDocument;
 use crate::quantity::Quantity;
 use crate::variant::{Domain, Template, Variable};
@@ -60,34 +61,6 @@ pub(crate) fn id(
     parts.push(hash_of(&asked)?);
     let within = format!("{} states, {} points", limits.max_states, limits.max_profile_points);
     Ok(Key::new("study", &parts.join(" ").as_str(), &within.as_str()))
-}
-
-/// Returns a design with all defaults, or the document itself if it is not a design.
-pub(crate) fn complete(design: &Tree) -> Result<Tree, NoAnswer> {
-    match design.read::<Design>() {
-        Ok(read) => tree_of(&read.normalised().with_defaults()),
-        Err(_) => Ok(design.clone()),
-    }
-}
-
-/// Returns the base with the default of each number that it leaves out at these pointers, and of the law that has it.
-pub(crate) fn with_defaults_at<'a>(base: &Tree, pointers: impl Iterator<Item = &'a String>) -> Result<Tree, NoAnswer> {
-    let (complete, mut written) = (complete(base)?, base.clone());
-    let law = ["model", "stiffness", "law"].map(String::from);
-    for place in pointers.filter_map(|pointer| path(pointer)).filter(|place| base.at(place).is_none()) {
-        if let Some(default @ Tree::Number(_)) = complete.at(&place) {
-            written.set(&place, default.clone());
-            if let (Some(name), true) = (complete.at(&law), place.starts_with(&law[..2])) {
-                written.set(&law, name.clone());
-            }
-        }
-    }
-    Ok(written)
-}
-
-fn tree_of(document: &impl serde::Serialize) -> Result<Tree, NoAnswer> {
-    let text = serde_json::to_vec(document).map_err(NoAnswer::internal)?;
-    json::tree(&text)
 }
 
 fn hash_of(tree: &Tree) -> Result<String, NoAnswer> {

@@ -8,6 +8,7 @@
 mod answer;
 mod ask;
 mod convert;
+mod defaults;
 mod document;
 mod evaluate;
 mod front;

@@ -250,9 +250,9 @@ impl Optimiser {
         base.iter().zip(difference).map(|(at, difference)| (at + difference).clamp(0.0, 1.0)).collect()
     }
 
-    /// Returns true if the last proposed point is useless, given lower bounds of its violations: [`Self::tell`] would
+    /// Returns true if the last proposed point cannot improve the search, given lower bounds of its violations: [`Self::tell`] would
     /// change nothing.
-    pub fn is_hopeless(&self, least: &Judged) -> bool {
+    pub fn cannot_improve(&self, least: &Judged) -> bool {
         let is_nearer = |nearest: &Point| least.beyond(None) < nearest.judged.beyond(None);
         let mut exceeded = least.violations.iter().enumerate().filter(|(_, violation)| **violation > 0.0);
         let is_relaxation = match (exceeded.next(), exceeded.next()) {
@@ -428,7 +428,7 @@ mod tests {
 
     /// The first of two limits is known early. Both together cannot be met if the second needs 1.9.
     #[test]
-    fn skipping_hopeless_points_changes_nothing() {
+    fn skipping_such_points_changes_nothing() {
         let plan = Plan { dimensions: 2, limits: 2, scan_from: 0, scan: 60, evaluations: 1500 };
         for needed in [1.0, 1.9] {
             let run = |skips: bool| {
@@ -438,7 +438,7 @@ mod tests {
                     let place = optimiser.ask();
                     let (early, late) = ((5.0 * place[0] - 3.0).max(0.0), (needed - place[0] - place[1]).max(0.0));
                     let least = Judged { objectives: Vec::new(), violations: vec![early, 0.0] };
-                    if skips && !is_scanning && optimiser.is_hopeless(&least) {
+                    if skips && !is_scanning && optimiser.cannot_improve(&least) {
                         skipped += 1;
                         optimiser.tell(None);
                         continue;

@@ -9,9 +9,9 @@ use toothwave_calculation::no_answer::NoAnswer;
 use utoipa::ToSchema;
 
 use crate::ask::{beyond, escaped, fault};
+use crate::defaults::{complete, with_defaults_at};
 use crate::document::{InputDocument, SensitivityDocument};
 use crate::evaluate::Evaluator;
-use crate::identity::{complete, with_defaults_at};
 use crate::rows::{ReasonAnswer, Rows, RowsPart};
 use crate::table::{Cell, Column, Content, Table};
 use crate::variant::{Asked, Domain, GRAIN_BYTES, Template, Value};

@@ -9,8 +9,8 @@ use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_solver::violation::MAX_TEETH;
 
 use crate::ask::{escaped, fault, whole};
+use crate::defaults::with_defaults_at;
 use crate::document::{DistributionDocument, DistributionKind, ToleranceDocument};
-use crate::identity::with_defaults_at;
 use crate::limit::Limit;
 use crate::random::Stream;
 use crate::rows::Rows;

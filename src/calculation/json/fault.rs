@@ -2,7 +2,8 @@
 
 use serde::de::{self, Unexpected};
 
-use crate::field::FieldCode;
+use crate::field::{FieldCode, FieldError};
+use crate::no_answer::{NoAnswer, NoAnswerCode};
 
 /// A structural error: the first one in the document.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +26,14 @@ impl Fault {
     /// Makes the error of a field, seen from its object.
     pub fn of_field(code: FieldCode, field: &str, detail: String) -> Self {
         Self { pointer: format!("/{}", escaped(field)), code, detail }
+    }
+}
+
+impl From<Fault> for NoAnswer {
+    fn from(Fault { pointer, code, detail }: Fault) -> Self {
+        let text = if pointer.is_empty() { detail.clone() } else { format!("{pointer}: {detail}") };
+        let error = FieldError { pointer, code, detail, value: None, limit: None };
+        Self::at_fields(NoAnswerCode::InvalidDocument, text, vec![error])
     }
 }
 

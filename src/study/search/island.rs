@@ -108,9 +108,10 @@ impl Island {
         };
         let values: Vec<Value> = variable_values(&self.template, &place);
         // The scan counts the violations of all limits.
-        let is_hopeless =
-            |values: &dyn Fn() -> Vec<f64>| !is_scanning && self.optimiser.is_hopeless(&search.least_judged(&values()));
-        let outcome = match evaluator.outcome_unless(is_hopeless, self.template.filled(&values), stop) {
+        let cannot_improve = |values: &dyn Fn() -> Vec<f64>| {
+            !is_scanning && self.optimiser.cannot_improve(&search.least_judged(&values()))
+        };
+        let outcome = match evaluator.outcome_unless(cannot_improve, self.template.filled(&values), stop) {
             Ok(outcome) => outcome.with_all(&evaluator.quantities),
             Err(interrupted) => {
                 self.pending = Some((place, is_scanning));

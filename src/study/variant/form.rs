@@ -8,7 +8,7 @@ use toothwave_calculation::json::Tree;
 
 use super::variable::{Domain, Variable};
 use super::{LAW, RING_TEETH};
-use crate::identity::complete;
+use crate::defaults::complete;
 
 #[derive(Debug, Clone)]
 pub(super) struct Form {
