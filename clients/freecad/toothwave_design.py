@@ -1,7 +1,8 @@
 """The design document as a table of fields: what the object's properties and the dialog are made of. No FreeCAD here."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 CONTACTS = (("wave_generator", "Wave generator"), ("ring", "Ring"), ("carrier", "Carrier"))
 PARTS = (CONTACTS[0], ("teeth", "Teeth"), *CONTACTS[1:])
@@ -9,7 +10,16 @@ BY_DEFAULT = "default"  # a choice that the document leaves to the service
 FLAGS = {"yes": True, "no": False}
 SWITCHES = ("ring_teeth_bend", "wave_generator_moves", "corner_contact")  # deprecated, of the model
 LOBES = {"ellipse": 2, "eccentric": 1}  # of other kinds they are a field
-UNPROJECTED = ("johnson", "hertz")  # the laws that `projection` does not take
+PROJECTED = ("linear", "palmgren", "fixed")  # the laws that `projection` takes
+
+# The fields of each kind, by the place of what comes in kinds. A kind or field without an entry below has its name in the document.
+KINDS = json.loads(Path(__file__).with_name("toothwave_kinds.json").read_text(encoding="utf-8"))
+CHOOSING_KINDS = {
+    "/drive/wave_generator": "WaveGeneratorKind",
+    "/drive/teeth": "ToothShape",
+    "/model/stiffness": "StiffnessLaw",
+    "/friction/wave_generator": "FrictionKind",
+}
 
 # Of the service's API document.
 LENGTH_MM = (1e-6, 1e6)
@@ -79,36 +89,31 @@ def _named(label):
 
 def _drive():
     kind, group = "WaveGeneratorKind", "Wave generator"
-    kinds = ("ellipse", "eccentric", "harmonic", "harmonic_path")
     place = "/drive/wave_generator"
 
-    def length(key, name, label, start, *where):
-        return Field(f"{place}/{key}", name, label, group, unit="mm", limits=LENGTH_MM, start=start, shown=(kind, where))
+    def length(key, name, label, start):
+        return Field(f"{place}/{key}", name, label, group, unit="mm", limits=LENGTH_MM, start=start)
 
-    yield Field(f"{place}/kind", kind, "Kind", group, start=kinds[0], choices=kinds)
-    yield length("semi_major_mm", "SemiMajor", "Semi-major axis a", 58.0, "ellipse")
-    yield length("semi_minor_mm", "SemiMinor", "Semi-minor axis b", 56.0, "ellipse")
-    yield length("radius_mm", "CircleRadius", "Radius R₀", 57.0, "eccentric")
-    yield length("eccentricity_mm", "Eccentricity", "Eccentricity e", 1.0, "eccentric")
-    yield Field(f"{place}/lobes", "Lobes", "Lobes U", group, limits=(1, 1000), start=2, shown=(kind, kinds[2:]))
-    yield length("mean_radius_mm", "MeanRadius", "Mean radius R₀", 57.0, "harmonic")
-    yield length("mean_path_radius_mm", "MeanPathRadius", "Mean radius of the path R", 62.0, "harmonic_path")
-    yield length("amplitude_mm", "Amplitude", "Amplitude e", 1.0, "harmonic", "harmonic_path")
+    yield Field(f"{place}/kind", kind, "Kind", group, start="ellipse", choices=tuple(KINDS[place]))
+    yield length("semi_major_mm", "SemiMajor", "Semi-major axis a", 58.0)
+    yield length("semi_minor_mm", "SemiMinor", "Semi-minor axis b", 56.0)
+    yield length("radius_mm", "CircleRadius", "Radius R₀", 57.0)
+    yield length("eccentricity_mm", "Eccentricity", "Eccentricity e", 1.0)
+    yield Field(f"{place}/lobes", "Lobes", "Lobes U", group, limits=(1, 1000), start=2)
+    yield length("mean_radius_mm", "MeanRadius", "Mean radius R₀", 57.0)
+    yield length("mean_path_radius_mm", "MeanPathRadius", "Mean radius of the path R", 62.0)
+    yield length("amplitude_mm", "Amplitude", "Amplitude e", 1.0)
 
     shape, group, place = "ToothShape", "Teeth and ring", "/drive/teeth"
-    shapes = ("cylinder", "ball", "flat_sided")
-    yield Field(f"{place}/shape", shape, "Shape of the teeth", group, start=shapes[0], choices=shapes)
+    yield Field(f"{place}/shape", shape, "Shape of the teeth", group, start="cylinder", choices=tuple(KINDS[place]))
     yield Field(f"{place}/count", "ToothCount", "Teeth in theory", group, limits=COUNT, start=28)
     yield Field(f"{place}/installed", "InstalledTeeth", "Teeth installed", group, 0, limits=COUNT, blank="all")
     yield Field(f"{place}/radius_mm", "ToothRadius", "Tooth radius r", group, unit="mm", limits=LENGTH_MM, start=5.0)
-    widths = (shape, ("cylinder", "flat_sided"))
-    yield Field(f"{place}/width_mm", "ToothWidth", "Tooth width", group, unit="mm", limits=LENGTH_MM, start=15.0, shown=widths)
-    flats = (shape, ("flat_sided",))
-    yield Field(f"{place}/flat_length_mm", "FlatLength", "Flats, length", group, None, "mm", LENGTH_MM, 4.0, shown=flats)
+    yield Field(f"{place}/width_mm", "ToothWidth", "Tooth width", group, unit="mm", limits=LENGTH_MM, start=15.0)
+    yield Field(f"{place}/flat_length_mm", "FlatLength", "Flats, length", group, None, "mm", LENGTH_MM, 4.0)
     for contact, label in CONTACTS:
         pointer, name = f"{place}/groove_radius_mm/{contact}", f"{_named(label)}GrooveRadius"
-        balls = (shape, ("ball",))
-        yield Field(pointer, name, f"Groove, {label.lower()}", group, 0.0, "mm", LENGTH_MM, blank="no groove", shown=balls)
+        yield Field(pointer, name, f"Groove, {label.lower()}", group, 0.0, "mm", LENGTH_MM, blank="no groove")
     yield Field("/drive/ring/teeth", "RingTeeth", "Ring teeth", group, limits=COUNT, start=26)
     yield Field("/drive/ring/tip_radius_mm", "TipRadius", "Ring's tip bored to", group, 0.0, "mm", LENGTH_MM, blank="natural tip")
 
@@ -132,16 +137,15 @@ def _model():
     group, free = "Model", "left to the service"
     ways = (BY_DEFAULT, "projection", "virtual_work")
     yield Field("/model/compatibility", "Compatibility", "Approaches add up by", group, BY_DEFAULT, blank=free, choices=ways)
-    law, laws = "StiffnessLaw", (BY_DEFAULT, "linear", "palmgren", "fixed", *UNPROJECTED)
-    yield Field("/model/stiffness/law", law, "Contact law", group, BY_DEFAULT, blank=free, choices=laws)
+    laws = (BY_DEFAULT, *KINDS["/model/stiffness"])
+    yield Field("/model/stiffness/law", "StiffnessLaw", "Contact law", group, BY_DEFAULT, blank=free, choices=laws)
     for contact, label in CONTACTS:
         pointer, name = f"/model/stiffness/{contact}_n_per_mm", f"{_named(label)}StiffnessNPerMm"
         label, limits = f"Stiffness, {label.lower()}", STIFFNESS_N_PER_MM
-        yield Field(pointer, name, label, group, None, "N/mm", limits, 500000.0, shown=(law, ("fixed",)))
+        yield Field(pointer, name, label, group, None, "N/mm", limits, 500000.0)
     for contact, label in CONTACTS:
         pointer, name = f"/model/stiffness/depth_mm/{contact}", f"{_named(label)}Depth"
-        label, johnson = f"Depth, {label.lower()}", (law, ("johnson",))
-        yield Field(pointer, name, label, group, 0.0, "mm", LENGTH_MM, blank="tooth radius", shown=johnson)
+        yield Field(pointer, name, f"Depth, {label.lower()}", group, 0.0, "mm", LENGTH_MM, blank="tooth radius")
     for contact, label in CONTACTS:
         pointer, name = f"/model/series_compliance_mm_per_n/{contact}", f"{_named(label)}ComplianceMmPerN"
         yield Field(pointer, name, f"Compliance behind, {label.lower()}", group, 0.0, "mm/N", (0.0, 1e3), blank="none")
@@ -154,7 +158,7 @@ def _model():
 
 def _friction():
     group, place, kind = "Friction", "/friction/wave_generator", "FrictionKind"
-    kinds = ("plain", "race", "rolling")
+    kinds = tuple(KINDS[place])
     choices = ("none", *kinds)
     yield Field(f"{place}/kind", kind, "Teeth run on", group, choices[0], blank="no friction computed", choices=choices)
 
@@ -165,14 +169,13 @@ def _friction():
     yield coefficient(pointer, "WaveGeneratorFriction", "μ, wave generator", 0.05, "plain", "race")
     yield coefficient("/friction/ring/coefficient", "RingFriction", "μ, ring", 0.05, *kinds)
     yield coefficient("/friction/carrier/coefficient", "CarrierFriction", "μ, carrier", 0.05, *kinds)
-    yield coefficient(f"{place}/bearing_coefficient", "BearingFriction", "μ, bearing", 0.0015, *kinds[1:])
-    pointer, bearings = f"{place}/bearing_radius_mm", (kind, kinds[1:])
-    yield Field(pointer, "BearingRadius", "Bearing's radius", group, None, "mm", LENGTH_MM, 28.0, shown=bearings)
+    yield coefficient(f"{place}/bearing_coefficient", "BearingFriction", "μ, bearing", 0.0015)
+    yield Field(f"{place}/bearing_radius_mm", "BearingRadius", "Bearing's radius", group, None, "mm", LENGTH_MM, 28.0)
     pointer, blank = f"{place}/bearing_load_rating_n", "no life asked for; an eccentric's alone"
-    yield Field(pointer, "BearingRatingN", "Bearing's rating C", group, 0.0, "N", (1e-3, 1e12), blank=blank, shown=bearings)
+    yield Field(pointer, "BearingRatingN", "Bearing's rating C", group, 0.0, "N", (1e-3, 1e12), blank=blank)
     pointer, elements = f"{place}/bearing_element", (BY_DEFAULT, "ball", "roller")
     blank = "left to the service"
-    yield Field(pointer, "BearingElement", "What rolls in it", group, BY_DEFAULT, blank=blank, choices=elements, shown=bearings)
+    yield Field(pointer, "BearingElement", "What rolls in it", group, BY_DEFAULT, blank=blank, choices=elements)
     for contact, label in CONTACTS:
         pointer, name = f"/friction/wear_rate_mm3_per_nm/{contact}", f"{_named(label)}WearMm3PerNm"
         label, limits, rubs = f"Wear rate, {label.lower()}", (0.0, 1e3), (kind, kinds)
@@ -234,7 +237,36 @@ def _parts():
     yield Field("", "OtherFields", "Other fields, as JSON", "Other", "", blank="none")
 
 
-FIELDS = (*_drive(), *_load(), *_model(), *_friction(), *_modification(), *_parts())
+def _with_kinds(fields):
+    """The fields, each shown with the kinds that have it, and those that have no entry."""
+    for place, kinds in KINDS.items():
+        having, described = {}, {}
+        for kind, below in kinds.items():
+            for field in below:
+                having.setdefault(field["pointer"], []).append(kind)
+                described[field["pointer"]] = field
+        shown = {pointer: (CHOOSING_KINDS[place], tuple(kinds)) for pointer, kinds in having.items()}
+        (group,) = (field.group for field in fields if field.name == CHOOSING_KINDS[place])
+        fields = [replace(field, shown=shown.get(field.pointer, field.shown)) for field in fields]
+        known = {field.pointer for field in fields}
+        # The last field holds what has none.
+        fields[-1:-1] = [_unlisted(place, group, field, shown[pointer]) for pointer, field in described.items() if pointer not in known]
+    return fields
+
+
+def _unlisted(place, group, field, shown):
+    words = field["pointer"][len(place) + 1 :].replace("/", ", ").replace("_", " ").capitalize()
+    name = "".join(word.title() for word in words.replace(",", "").split())
+    if "choices" in field:
+        return Field(field["pointer"], name, words, group, BY_DEFAULT, blank="left out", choices=(BY_DEFAULT, *field["choices"]), shown=shown)
+    number = int if field["is_whole"] else float
+    limits = (number(field["low"]), number(field["high"]))
+    start = max(limits[0], min(number(1), limits[1])) if field["is_required"] else None
+    blank = "" if field["is_required"] else "left out"
+    return Field(field["pointer"], name, words, group, number(0), field["unit"], limits, start, blank, shown=shown)
+
+
+FIELDS = tuple(_with_kinds([*_drive(), *_load(), *_model(), *_friction(), *_modification(), *_parts()]))
 CHOOSING = tuple(dict.fromkeys(field.shown[0] for field in FIELDS if field.shown))  # names of fields that others depend on
 OTHER = FIELDS[-1].name
 
@@ -392,6 +424,6 @@ def suited(values, chosen):
     is_ball, law, way = values["ToothShape"] == "ball", values["StiffnessLaw"], values["Compatibility"]
     if law not in (BY_DEFAULT, "fixed") and is_ball != (law == "hertz"):
         law = BY_DEFAULT
-    if way == "projection" and (law in UNPROJECTED or is_ball and law != "fixed"):
+    if way == "projection" and (law not in (BY_DEFAULT, *PROJECTED) or is_ball and law != "fixed"):
         law, way = (BY_DEFAULT, way) if chosen == "Compatibility" and not is_ball else (law, "virtual_work")
     return {"StiffnessLaw": law, "Compatibility": way}

@@ -1,4 +1,5 @@
-"""Writes the pages of docs/reference that follow from the code: design document, quantities, settings.
+"""Writes what follows from the code: the pages of docs/reference for design document, quantities and settings, and the kinds
+of wave generator, teeth, contact law and friction for page and FreeCAD.
 
     tests/docs/generate.py BINARY            writes them
     tests/docs/generate.py BINARY --check    compares them with the code, and findings.md and problems.md with the codes that there are;
@@ -21,11 +22,13 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 REFERENCE = ROOT / "docs" / "reference"
 WRITTEN = "<!-- Written by tests/docs/generate.py from the code. -->"
+KINDS_WRITTEN = "Kinds of the design document with their fields. Written by tests/docs/generate.py from the API document."
 UNITS = [
     ("_mm3_per_nm", "mm³/(N·m)"), ("_mm_per_n", "mm/N"), ("_n_per_mm", "N/mm"), ("_nm", "N·m"), ("_mpa", "MPa"), ("_gpa", "GPa"),
     ("_rpm", "1/min"), ("_arcsec", "arcsec"), ("_deg", "°"), ("_um", "µm"), ("_mm", "mm"), ("_n", "N"),
 ]  # fmt: skip
 LAST_PART = r"^(.*/)(carrier|ring|teeth|wave_generator)(?=$|/|_runout)"
+UNIONS = {"/drive/wave_generator": "WaveGenerator", "/drive/teeth": "Teeth", "/model/stiffness": "Stiffness", "/friction/wave_generator": "WaveGeneratorFriction"}
 SECTIONS = {
     "drive": "`drive` is required: every endpoint reads it.",
     "load": "",
@@ -199,6 +202,30 @@ def design_document(document):
     return "\n\n".join(parts) + "\n"
 
 
+def kinds(document):
+    """The fields of each kind, by the place of the union and the kind's name; what all kinds have is left out."""
+    found = {}
+    for place, name in UNIONS.items():
+        schema = document.schemas[name]
+        word = document.word_of_choice(schema)
+        variants = [document.resolved(variant) for variant in schema["oneOf"]]
+        common = set.intersection(*(set(variant["properties"]) for variant in variants))
+        found[place] = {}
+        for variant in variants:
+            rows = document.rows({**variant, "properties": {name: field for name, field in variant["properties"].items() if name not in common}}, place)
+            (kind,) = variant["properties"][word]["enum"]
+            # A list has no field in a form.
+            found[place][kind] = [kind_field(path, field, is_required) for path, field, is_required in rows if "/0" not in path]
+    return found
+
+
+def kind_field(path, schema, is_required):
+    field = {"pointer": path, "unit": unit(path).replace("°", "deg"), "meaning": " ".join(schema["description"].split())}
+    if "enum" in schema:
+        return {**field, "choices": schema["enum"]}
+    return {**field, "low": schema["minimum"], "high": schema["maximum"], "is_whole": schema["type"] == "integer", "is_required": is_required}
+
+
 def quantities(listed):
     needs = {"drive": "", "load": "a load", "allowable_stress": "an allowable stress", "carrier_strength": "the carrier's strength", "friction": "a load and friction"}
     rows = [["quantity", "unit", "needs", "meaning"]]
@@ -286,20 +313,23 @@ def main(binary, is_check):
     document = Document(json.loads(of(binary, "openapi")))
     faults = list(differing_codes(document))
     with service(binary) as address:
-        pages = {
-            "design-document.md": design_document(document),
-            "quantities.md": quantities(listed_quantities(address)),
-            "settings.md": settings(of(binary, "serve", "--help")),
+        written = {
+            "docs/reference/design-document.md": design_document(document),
+            "docs/reference/quantities.md": quantities(listed_quantities(address)),
+            "docs/reference/settings.md": settings(of(binary, "serve", "--help")),
+            "src/service/page/kinds.js": f"// {KINDS_WRITTEN}\nexport const KINDS = {json.dumps(kinds(document), ensure_ascii=False, indent=1)};\n",
+            "clients/freecad/toothwave_kinds.json": json.dumps(kinds(document), ensure_ascii=False, indent=1) + "\n",
         }
         faults += refused_documents(address)
-    for name, text in pages.items():
-        file = REFERENCE / name
+    for name, text in written.items():
+        file = ROOT / name
+        there = file.read_text(encoding="utf-8") if file.exists() else ""
         if not is_check:
             file.write_text(text, encoding="utf-8")
-        elif (there := file.read_text(encoding="utf-8")) != text:
-            faults += difflib.unified_diff(there.splitlines(), text.splitlines(), f"docs/reference/{name}", "the code", lineterm="", n=0)
+        elif there != text:
+            faults += difflib.unified_diff(there.splitlines(), text.splitlines(), name, "the code", lineterm="", n=0)
     if faults:
-        sys.exit("\n".join([*faults, "write the pages anew: tests/docs/generate.py BINARY"]))
+        sys.exit("\n".join([*faults, "write the files anew: tests/docs/generate.py BINARY"]))
 
 
 if __name__ == "__main__":

@@ -315,6 +315,12 @@ class Document(unittest.TestCase):
                 with self.subTest(union, kind=kind):
                     self.assertEqual(shown, expected)
 
+    def test_a_field_of_a_kind_without_an_entry_has_its_name_and_range(self):
+        listed = [field for field in toothwave_design.FIELDS if not field.pointer.endswith("mean_path_radius_mm")]
+        (found,) = (field for field in toothwave_design._with_kinds(listed) if field.pointer.endswith("mean_path_radius_mm"))
+        self.assertEqual((found.label, found.name, found.unit, found.start), ("Mean path radius mm", "MeanPathRadiusMm", "mm", 1.0))
+        self.assertEqual((found.limits, found.shown), (toothwave_design.LENGTH_MM, ("WaveGeneratorKind", ("harmonic_path",))))
+
     def test_every_wave_generator_and_shape_has_an_example(self):
         drives = [complete(example(path.stem))["drive"] for path in (ROOT / "examples").glob("*.json")]
         for name, part, tag in (("WaveGeneratorKind", "wave_generator", "kind"), ("ToothShape", "teeth", "shape")):

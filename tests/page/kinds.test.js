@@ -402,6 +402,14 @@ test('fields match the API document, with listed exceptions', async () => {
   assert.deepEqual(Object.keys(NOT_IN_THE_FORM).filter((pointer) => !known.has(pointer) || fields.has(pointer)), []);
 });
 
+test('a kind without an entry has its fields by their names', async () => {
+  const { nameOf, variant } = await import('../../src/service/page/field.js');
+  const [, ...others] = variant(WAVE_GENERATOR, 'kind', [{ value: 'ellipse', fields: [] }]).options;
+  const path = others.find(({ value }) => value === 'harmonic_path');
+  assert.deepEqual(path.fields.map(({ pointer, whole, unit }) => [pointer.split('/').at(-1), whole, unit]), [['amplitude_mm', false, 'mm'], ['lobes', true, ''], ['mean_path_radius_mm', false, 'mm']]);
+  assert.deepEqual(nameOf(`${WAVE_GENERATOR}/mean_path_radius_mm`, 2), { label: 'Mean path radius', unit: 'mm' });
+});
+
 test('every kind can be chosen and has its fields', async () => {
   const page = await bed.open();
   const { schemas } = (await (await fetch(`${bed.server.origin}/openapi.json`)).json()).components;

@@ -32,8 +32,8 @@ export const RIM = 1.2;
 
 export const outerRadiusOf = (design, { ring }) => at(design, '/parts/ring/outer_radius_mm') ?? RIM * (ring.root_radius_mm + (at(design, '/parts/ring/clearance_um') ?? 0) / 1000);
 
-/** Laws that `projection` does not take. */
-const UNPROJECTED = new Set(['johnson', 'hertz']);
+/** Laws that `projection` takes. */
+const PROJECTED = new Set(['linear', 'palmgren', 'fixed']);
 
 /** Lobes of the wave generator: as many teeth the carrier has to have more or fewer than the ring. */
 export function lobesOf(design) {
@@ -64,12 +64,12 @@ export function sizeOf(design) {
 export function withLaw(design) {
   const isSuited = lawOf(design) === 'fixed' || isBall(design) === (lawOf(design) === 'hertz');
   const suited = isSuited ? design : changed(design, '/model/stiffness', undefined);
-  return UNPROJECTED.has(lawOf(suited)) ? changed(suited, '/model/compatibility', 'virtual_work') : suited;
+  return !PROJECTED.has(lawOf(suited)) ? changed(suited, '/model/compatibility', 'virtual_work') : suited;
 }
 
 /** Johnson's law gives way to the linear one where approaches are projected. */
 export const withProjectedLaw = (design) =>
-  compatibilityOf(design) === 'projection' && UNPROJECTED.has(lawOf(design)) ? changed(design, '/model/stiffness', { law: 'linear' }) : design;
+  compatibilityOf(design) === 'projection' && !PROJECTED.has(lawOf(design)) ? changed(design, '/model/stiffness', { law: 'linear' }) : design;
 
 /** Input over output speed, ring fixed: what the counts of a document say, be the drive possible or not. */
 export function ratioOf(design) {

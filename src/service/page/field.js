@@ -7,10 +7,36 @@
 // Labels are texts by pointer, those of options by pointer and value, or by `text` where the value is none.
 
 import { at } from './design.js';
-import { t, textOf } from './texts.js';
+import { KINDS } from './kinds.js';
+import { capital, t, textOf } from './texts.js';
 
 const label = (pointer) => t(`label.${pointer}`);
 const withLabels = (pointer, options) => options.map((option) => ({ label: t(`option.${pointer}.${option.text ?? option.key ?? option.value}`), ...option }));
+
+const UNITS = { mm: 'mm', um: 'µm', deg: '°', arcsec: '″', nm: 'N·m', mpa: 'MPa', gpa: 'GPa', rpm: '1/min' };
+
+/** A field without a text, `{ label, unit }`, by the name that the document has for it within its first groups. */
+export function nameOf(pointer, groups) {
+  const parts = pointer.split('/').slice(1 + groups);
+  const [, name, unit] = /^(.*?)(?:_([a-z]+))?$/.exec(parts.at(-1));
+  const isUnit = unit in UNITS;
+  const words = [...parts.slice(0, -1), isUnit ? name : parts.at(-1)].join(', ').replaceAll('_', ' ');
+  return { label: capital(words), unit: isUnit ? UNITS[unit] : '' };
+}
+
+/** The kinds that have no entry in the form, with the fields that the API document gives them. */
+const otherKinds = (pointer, options) => {
+  const listed = new Set(options.map(({ value }) => value));
+  return Object.entries(KINDS[pointer]).filter(([value]) => !listed.has(value)).map(([value, fields]) => ({
+    value,
+    label: textOf(`option.${pointer}.${value}`) ?? capital(value.replaceAll('_', ' ')),
+    fields: fields.map(({ pointer: place, unit, choices, is_whole: isWhole, is_required: isRequired }) => {
+      const own = { label: textOf(`label.${place}`) ?? nameOf(place, 2).label };
+      if (choices) return { ...unlessSaid(place, choices.map((choice) => ({ value: choice, label: choice }))), ...own };
+      return number(place, '', unit, { ...own, whole: isWhole, optional: isRequired ? undefined : () => '' });
+    }),
+  }));
+};
 
 export const number = (pointer, symbol, unit, more) => ({ kind: 'number', pointer, label: label(pointer), symbol, unit, ...more });
 export const whole = (pointer, symbol, more) => ({ kind: 'number', whole: true, pointer, label: label(pointer), symbol, ...more });
@@ -19,7 +45,9 @@ export const choice = (pointer, options, more) => ({ kind: 'choice', pointer, la
 export const unlessSaid = (pointer, options) => choice(pointer, [{ value: '', label: t('option.not_given') }, ...options]);
 /** What a document says with `true`, or, where it `starts` with an object, by having that object. */
 export const flag = (pointer, more) => ({ kind: 'flag', pointer, label: label(pointer), ...more });
-export const variant = (pointer, tag, options, more) => ({ kind: 'variant', pointer, tag, label: label(pointer), name: textOf(`name.${pointer}`), options: withLabels(pointer, options), ...more });
+export const variant = (pointer, tag, options, more) => ({
+  kind: 'variant', pointer, tag, label: label(pointer), name: textOf(`name.${pointer}`), options: [...withLabels(pointer, options), ...otherKinds(pointer, options)], ...more,
+});
 /** An object with exactly one of several fields. */
 export const oneOf = (pointer, options, more) => ({ kind: 'oneOf', pointer, label: label(pointer), name: textOf(`name.${pointer}`), options: withLabels(pointer, options), ...more });
 export const lines = (pointer, columns) => ({ kind: 'lines', pointer, label: label(pointer), columns });
@@ -30,10 +58,12 @@ export const group = (pointer) => ({ title: t(`group.${pointer}`), hint: textOf(
 /** A field's label where it stands without its group. */
 export const fullLabel = ({ label: own, of }) => (of ? t('name.of', { label: own, of: of.toLowerCase() }) : own);
 
+const MEANINGS = new Map(Object.values(KINDS).flatMap(Object.values).flat().map(({ pointer, meaning }) => [pointer, meaning]));
+
 const PART = /(?<=\/|allowable_)(wave_generator|teeth|ring|carrier)(?=_runout|_n_per_mm$|_um$|_mpa$|$|\/[^/]*$)/;
 
 /** What a field means. */
-export const explanationOf = (pointer) => textOf(`explain.${pointer}`) ?? textOf(`explain.${pointer.replace(PART, '*')}`);
+export const explanationOf = (pointer) => textOf(`explain.${pointer}`) ?? textOf(`explain.${pointer.replace(PART, '*')}`) ?? MEANINGS.get(pointer);
 
 /** Every field that can stand in the form, with the group that holds it. */
 export function fieldsOf({ parts, fields }) {

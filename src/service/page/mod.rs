@@ -47,6 +47,7 @@ const ASSETS: &[Asset] = assets![
     "studies.css" as CSS,
     "icon.svg" as SVG,
     "theme.js" as SCRIPT,
+    "kinds.js" as SCRIPT,
     "language.js" as SCRIPT,
     "main.js" as SCRIPT,
     "access.js" as SCRIPT,

@@ -1,7 +1,7 @@
 // The numbers of a design that a study can vary, with the words that the form has for them.
 
 import { at, changed, lobesOf } from './design.js';
-import { fieldsOf, fullLabel } from './field.js';
+import { fieldsOf, fullLabel, nameOf } from './field.js';
 import { GROUPS } from './fields.js';
 
 /** What changes the drawing of a profile or the sampling of a sweep is no parameter of the drive. */
@@ -38,11 +38,7 @@ export const parameterOf = (design, pointer) => parametersOf(design).find((param
 export function wordsOf(pointer) {
   const field = GROUPS.flatMap(fieldsOf).find((candidate) => candidate.pointer === pointer);
   if (field) return { label: fullLabel(field), unit: field.unit ?? '' };
-  const parts = pointer.split('/').slice(2);
-  const [, name, ending] = /^(.*?)(_mm|_um|_deg|_arcsec|_nm|_mpa|_gpa|_rpm)?$/.exec(parts.at(-1));
-  const unit = { _mm: 'mm', _um: 'µm', _deg: '°', _arcsec: '″', _nm: 'N·m', _mpa: 'MPa', _gpa: 'GPa', _rpm: '1/min' }[ending] ?? '';
-  const words = [...parts.slice(0, -1), name].join(', ').replaceAll('_', ' ');
-  return { label: words[0].toUpperCase() + words.slice(1), unit };
+  return nameOf(pointer, 1);
 }
 
 const tidy = (value) => Number(value.toPrecision(4));

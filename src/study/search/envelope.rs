@@ -114,7 +114,7 @@ pub(super) fn with_wave_generator(base: &mut Tree) -> Result<f64, NoAnswer> {
     }
     match (word_at(base, KIND), base.at(&place(LOBES))) {
         (Some("eccentric"), _) => Ok(1.0),
-        (Some("harmonic" | "harmonic_path"), Some(Tree::Number(lobes))) => {
+        (Some(kind), Some(Tree::Number(lobes))) if kind != "ellipse" => {
             if (1.0..=MOST).contains(lobes) {
                 return Ok(*lobes);
             }
