@@ -7,7 +7,7 @@ mod loaded_drive;
 mod tooth_state;
 
 #[doc(hidden)]
-pub use capacity::{LawEnd, TorqueLimit};
+pub use capacity::TorqueLimit;
 pub use equilibrium::Compatibility;
 #[doc(hidden)]
 pub use equilibrium::ToothState;

@@ -336,13 +336,6 @@ impl Mesh {
         0.5 * f64::from(self.lobes) * (2.0 * PI / self.steps(samples) as f64)
     }
 
-    /// Returns the position of a tooth at a sample; none outside the range from lobe to valley. Needs zones that are
-    /// alike.
-    pub fn position(&self, tooth: u64, sample: u64, samples: Samples) -> Option<Position> {
-        let steps = tooth.checked_mul(samples.0)?.checked_sub(sample)?;
-        Position::of_turn(steps, self.steps(samples), self.lobes)
-    }
-
     /// Returns the position of a tooth in mesh at a sample. Needs zones that are alike.
     pub(crate) fn position_in_mesh(&self, tooth: u64, sample: u64, samples: Samples) -> Position {
         Position::of_lobe(self.lobes() * (tooth * samples.0 - sample), self.steps(samples), self.lobes)

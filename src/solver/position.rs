@@ -59,17 +59,9 @@ impl Position {
         Self { from_lobe_rad, from_valley_rad, phase_cos, phase_sin, lobes }
     }
 
-    /// Returns the position at the fraction `numerator / denominator` of a turn from the lobe, exact towards both ends;
-    /// none beyond the valley.
-    pub fn of_turn(numerator: u64, denominator: u64, lobes: u32) -> Option<Self> {
-        let of_lobe = numerator.checked_mul(u64::from(lobes))?;
-        let is_to_valley = denominator > 0 && 2 * u128::from(of_lobe) <= u128::from(denominator);
-        is_to_valley.then(|| Self::of_lobe(of_lobe, denominator, lobes))
-    }
-
     /// Returns the position at the fraction `numerator / denominator` of a lobe, at most half of it; exact towards both
     /// ends.
-    pub(crate) fn of_lobe(numerator: u64, denominator: u64, lobes: u32) -> Self {
+    pub fn of_lobe(numerator: u64, denominator: u64, lobes: u32) -> Self {
         debug_assert!(2 * u128::from(numerator) <= u128::from(denominator));
         // Below 2^53 for every sweep (lobes × samples × installed teeth), so that the conversions are exact.
         let whole = denominator as f64;

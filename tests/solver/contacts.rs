@@ -40,10 +40,8 @@ fn exactly_loaded_teeth_close_their_gaps() {
                 let loaded = LoadedDrive::new(&possible, &LoadCase::new(&load).unwrap()).unwrap();
                 let mesh = Mesh::new(&possible);
                 for sample in 0..samples.count() {
-                    let teeth: Vec<_> = mesh
-                        .teeth_at(sample, samples)
-                        .map(|tooth| loaded.tooth(mesh.position(tooth, sample, samples).unwrap()).unwrap())
-                        .collect();
+                    let placed = mesh.placed_at(sample, samples);
+                    let teeth: Vec<_> = placed.map(|placed| loaded.tooth(placed.position).unwrap()).collect();
                     let wind_up = loaded.wind_up(&teeth).unwrap();
                     let mut torque_nmm = 0.0;
                     for tooth in &teeth {

@@ -13,7 +13,6 @@ use toothwave_solver::mesh::Place;
 use toothwave_solver::model_error;
 use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::sweep::{self, Points, States, Sweep};
-use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
     ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, Parameter, PerContact, Position, SolveError,
     ToothShape, Violation, WaveGenerator,
@@ -487,8 +486,7 @@ fn turned_space_moves_its_corner_by_its_arm() {
             ring_space_angle_arcsec[0] = arcsec;
             let deviations = Deviations { ring_space_angle_arcsec, ..Deviations::default() };
             let case = LoadCase::new(&pressed_corners(3.0)).unwrap();
-            let shape = ToothContact::of(&drive, case.parameters().carrier);
-            let loaded = LoadedDrive::with_deviations(&drive, &case, &shape, Some(&deviations)).unwrap();
+            let loaded = LoadedDrive::deviating(&drive, &case, &deviations).unwrap();
             let place = Place { slot: 0, ring_space: 0, lobe: 0 };
             let tooth = loaded.tooth_at(&place, Position::from_lobe(position_deg.to_radians(), 2)).unwrap();
             let gap_mm = seen(&drive, position_deg, f64::to_radians(arcsec / 3600.0)).gap_mm;
@@ -506,13 +504,12 @@ fn turned_slot_moves_tooth_by_slot_force_share() {
     let drive = drive(&PAPER_5_2);
     let end_deg = drive.flank_limit().position.from_lobe_deg();
     let case = LoadCase::new(&pressed_corners(3.0)).unwrap();
-    let shape = ToothContact::of(&drive, case.parameters().carrier);
     for beyond_deg in [0.1, 1.0, 4.0] {
         let tooth = |arcsec: f64| {
             let mut slot_angle_arcsec = vec![0.0; 40];
             slot_angle_arcsec[0] = arcsec;
             let deviations = Deviations { slot_angle_arcsec, ..Deviations::default() };
-            let loaded = LoadedDrive::with_deviations(&drive, &case, &shape, Some(&deviations)).unwrap();
+            let loaded = LoadedDrive::deviating(&drive, &case, &deviations).unwrap();
             let position = Position::from_lobe((end_deg + beyond_deg).to_radians(), 2);
             loaded.tooth_at(&Place { slot: 0, ring_space: 0, lobe: 0 }, position).unwrap()
         };

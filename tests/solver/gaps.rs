@@ -7,7 +7,6 @@ use toothwave_solver::Compatibility::{Projection, VirtualWork};
 use toothwave_solver::gaps::{Deviations, Gaps, Runout, TipRelief};
 use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::mesh::{Mesh, Place, Samples};
-use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::violation::{Listed, Modified};
 use toothwave_solver::{
     Drive, DriveParameters, FieldCode, LoadCase, LoadParameters, Modification, Never, Parameter, PerContact, Position,
@@ -306,7 +305,10 @@ fn deviating_teeth_of_both_zones_share_load() {
             ..load(20.0, VirtualWork)
         })
         .unwrap();
-        let loaded = LoadedDrive::with_deviations(&drive, &case, &ToothContact::Cylinder, deviations)?;
+        let loaded = match deviations {
+            Some(deviations) => LoadedDrive::deviating(&drive, &case, deviations)?,
+            None => LoadedDrive::new(&drive, &case)?,
+        };
         let mut teeth = Vec::new();
         for lobe in 0..zones {
             for placed in mesh.placed_at(1, Samples::new(4).unwrap()) {
@@ -403,7 +405,7 @@ fn rejects_deviations_under_projection_or_of_wrong_length() {
     let drive = drive(&PAPER_5_1);
     let with = |compatibility, deviations: &Deviations| {
         let case = LoadCase::new(&load(20.0, compatibility)).unwrap();
-        LoadedDrive::with_deviations(&drive, &case, &ToothContact::Cylinder, Some(deviations)).map(|_| ())
+        LoadedDrive::deviating(&drive, &case, deviations).map(|_| ())
     };
     let some = Deviations { slot_wall_um: vec![1.0; 28], ..Deviations::default() };
     assert_eq!(with(VirtualWork, &some), Ok(()));

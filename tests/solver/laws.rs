@@ -10,9 +10,9 @@ use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::mesh::{Mesh, Samples};
 use toothwave_solver::parts::CarrierRadii;
 use toothwave_solver::sweep::{self, Points};
+use toothwave_solver::tooth::Pressure;
 use toothwave_solver::tooth::flat::FlatContact;
 use toothwave_solver::tooth::point::EllipticContact;
-use toothwave_solver::tooth::{Pressure, ToothContact};
 use toothwave_solver::{
     Contact, ContactLaw, Drive, DriveParameters, FieldCode, Finding, FindingCode, LoadCase, LoadParameters, Material,
     Materials, Never, Parameter, PerContact, Position, SolveError, ToothShape, Violation, findings,
@@ -622,15 +622,15 @@ fn flat_approach_is_mean_under_uniform_pressure() {
 
 #[test]
 fn flat_sided_teeth_work_with_any_cylinder_law() {
-    let drive = drive(&PAPER_5_1);
-    let shape = |outer_mm| ToothContact::FlatSided {
-        flat_length_mm: 4.0,
-        carrier_inner_radius_mm: 58.5,
-        carrier_outer_radius_mm: outer_mm,
+    let tooth = ToothShape::FlatSided { width_mm: 15.0, flat_length_mm: 4.0 };
+    let drive = drive(&DriveParameters { tooth, ..PAPER_5_1 });
+    let within = |outer_mm| LoadParameters {
+        carrier: CarrierRadii { inner_mm: Some(58.5), outer_mm: Some(outer_mm) },
+        ..load(20.0, VirtualWork)
     };
     for law in [ContactLaw::Linear, ContactLaw::Palmgren, ContactLaw::JOHNSON] {
-        let case = LoadCase::new(&LoadParameters { law, ..load(20.0, VirtualWork) }).unwrap();
-        let loaded = LoadedDrive::with_teeth(&drive, &case, &shape(65.5)).unwrap();
+        let case = LoadCase::new(&LoadParameters { law, ..within(65.5) }).unwrap();
+        let loaded = LoadedDrive::new(&drive, &case).unwrap();
         let mesh = Mesh::new(&drive);
         let teeth: Vec<_> =
             mesh.placed_at(1, Samples::new(3).unwrap()).map(|placed| loaded.tooth(placed.position).unwrap()).collect();
@@ -646,8 +646,8 @@ fn flat_sided_teeth_work_with_any_cylinder_law() {
         }
         assert!((torque / 20e3 - 1.0).abs() < 1e-14);
     }
-    let case = LoadCase::new(&load(20.0, VirtualWork)).unwrap();
-    let loaded = LoadedDrive::with_teeth(&drive, &case, &shape(60.0)).unwrap();
+    let case = LoadCase::new(&within(60.0)).unwrap();
+    let loaded = LoadedDrive::new(&drive, &case).unwrap();
     let left = loaded.tooth(Position::from_lobe(0.1, 2));
     assert!(matches!(left, Err(SolveError::FlatOffCarrier { .. })), "{left:?}");
 }
@@ -764,11 +764,11 @@ fn palmgrens_law_is_not_questioned_at_flats() {
 
 #[test]
 fn only_balls_take_hertz_beside_fixed() {
-    let drive = drive(&PAPER_5_1);
-    let ball = ToothContact::Ball { groove_radius_mm: PerContact::default() };
-    let accepts = |law, shape: &ToothContact| {
+    let ball = ToothShape::Ball { groove_radius_mm: PerContact::default() };
+    let accepts = |law, tooth| {
+        let drive = drive(&DriveParameters { tooth, ..PAPER_5_1 });
         let case = LoadCase::new(&LoadParameters { law, ..load(20.0, VirtualWork) }).unwrap();
-        match LoadedDrive::with_teeth(&drive, &case, shape) {
+        match LoadedDrive::new(&drive, &case) {
             Ok(_) => true,
             Err(error) => {
                 let SolveError::Impossible(found) = error else { panic!("{error:?}") };
@@ -780,13 +780,13 @@ fn only_balls_take_hertz_beside_fixed() {
         }
     };
     let fixed = ContactLaw::Fixed(PerContact { wave_generator: 1e5, ring: 1e5, carrier: 1e5 });
-    assert!(accepts(ContactLaw::Hertz, &ball) && accepts(fixed, &ball));
+    assert!(accepts(ContactLaw::Hertz, ball) && accepts(fixed, ball));
     assert!(
-        !accepts(ContactLaw::Linear, &ball)
-            && !accepts(ContactLaw::Palmgren, &ball)
-            && !accepts(ContactLaw::JOHNSON, &ball)
+        !accepts(ContactLaw::Linear, ball)
+            && !accepts(ContactLaw::Palmgren, ball)
+            && !accepts(ContactLaw::JOHNSON, ball)
     );
-    assert!(!accepts(ContactLaw::Hertz, &ToothContact::Cylinder));
+    assert!(!accepts(ContactLaw::Hertz, PAPER_5_1.tooth));
 }
 
 proptest! {

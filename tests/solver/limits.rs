@@ -5,7 +5,6 @@ use toothwave_solver::{
     Compatibility, Contact, ContactLaw, Drive, DriveParameters, FieldCode, Finding, FindingCode, LoadCase,
     LoadParameters, Modification, Never, Parameter, PerContact, Position, Severity, SolveError, ToothShape, Torque,
     Violation, WaveGenerator, findings,
-    mesh::{Mesh, Samples},
     sweep::{self, Points},
 };
 
@@ -507,17 +506,9 @@ fn rejects_impossible_sample_count_or_tolerance() {
 }
 
 #[test]
-fn position_lies_between_major_and_minor_axis() {
-    assert_eq!(Position::of_turn(1, 4, 2), Some(Position::valley(2)));
-    assert_eq!(Position::of_turn(0, 4, 2), Some(Position::lobe(2)));
-    for (numerator, denominator) in [(1, 2), (1, 0), (0, 0), (u64::MAX, u64::MAX), (26, 100)] {
-        assert_eq!(Position::of_turn(numerator, denominator, 2), None);
-    }
-    let (mesh, samples) = (Mesh::new(&drive(&PAPER_5_1)), Samples::new(50).unwrap());
-    assert!(mesh.position(7, 0, samples).is_some());
-    assert_eq!(mesh.position(0, 1, samples), None, "beyond the major axis");
-    assert_eq!(mesh.position(8, 0, samples), None, "beyond the minor axis");
-    assert_eq!(mesh.position(u64::MAX, 0, samples), None);
+fn positions_at_both_axes_are_exact() {
+    assert_eq!(Position::of_lobe(1, 2, 2), Position::valley(2));
+    assert_eq!(Position::of_lobe(0, 2, 2), Position::lobe(2));
 }
 
 #[test]

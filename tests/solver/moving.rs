@@ -6,7 +6,6 @@ use toothwave_solver::load_sharing::{LoadedDrive, ToothState};
 use toothwave_solver::mesh::{Place, Samples};
 use toothwave_solver::springs::{Rotation, Springs, WindUp};
 use toothwave_solver::sweep::{self, Points};
-use toothwave_solver::tooth::ToothContact;
 use toothwave_solver::{
     ContactLaw, Deviations, Drive, DriveParameters, LoadCase, LoadParameters, Material, Materials, Modification, Never,
     Parameter, PerContact, Position, SolveError, ToothShape, Torque, Violation, WaveGenerator,
@@ -231,13 +230,12 @@ fn tooth_of_turned_slot_closes_remaining_gaps() {
     let drive = drive(&PAPER_5_1);
     let clearance_um = PerContact { ring: 300.0, ..PerContact::default() };
     let case = LoadCase::new(&LoadParameters { clearance_um, ..moving(20.0) }).unwrap();
-    let shape = ToothContact::of(&drive, case.parameters().carrier);
     for position_rad in [0.5, 1.2, 1.5] {
         for arcsec in [-2000.0_f64, -300.0, 300.0] {
             let mut slot_angle_arcsec = vec![0.0; 28];
             slot_angle_arcsec[5] = arcsec;
             let deviations = Deviations { slot_angle_arcsec, ..Deviations::default() };
-            let loaded = LoadedDrive::with_deviations(&drive, &case, &shape, Some(&deviations)).unwrap();
+            let loaded = LoadedDrive::deviating(&drive, &case, &deviations).unwrap();
             let place = Place { slot: 5, ring_space: 5, lobe: 0 };
             let tooth = loaded.tooth_at(&place, Position::from_lobe(position_rad, 2)).unwrap();
             let cos = 1.0 / tooth.center.tan_pressure_angle.hypot(1.0);
@@ -263,12 +261,11 @@ fn tooth_of_turned_slot_closes_remaining_gaps() {
 fn turned_item_does_not_affect_other_teeth() {
     let drive = drive(&PAPER_5_1);
     let case = LoadCase::new(&moving(20.0)).unwrap();
-    let shape = ToothContact::of(&drive, case.parameters().carrier);
     let spring = |slot_arcsec: f64, space_arcsec: f64| {
         let (mut slot_angle_arcsec, mut ring_space_angle_arcsec) = (vec![0.0; 28], vec![0.0; 26]);
         (slot_angle_arcsec[3], ring_space_angle_arcsec[3]) = (slot_arcsec, space_arcsec);
         let deviations = Deviations { slot_angle_arcsec, ring_space_angle_arcsec, ..Deviations::default() };
-        let loaded = LoadedDrive::with_deviations(&drive, &case, &shape, Some(&deviations)).unwrap();
+        let loaded = LoadedDrive::deviating(&drive, &case, &deviations).unwrap();
         let other = Place { slot: 5, ring_space: 5, lobe: 0 };
         loaded.tooth_at(&other, Position::from_lobe(0.6, 2)).unwrap().spring
     };

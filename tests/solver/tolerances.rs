@@ -61,7 +61,8 @@ fn tolerance_sweep_lists_no_regular_angle_twice() {
 /// Returns the bore that ends the flank this many spacings from the major axis, up to rounding.
 fn bore_at(unbored: &Drive, spacings: u64) -> Option<f64> {
     let flank = unbored.flank();
-    let position = Position::of_turn(spacings, unbored.parameters().installed.unsigned_abs(), 2)?;
+    let installed = unbored.parameters().installed.unsigned_abs();
+    let position = (4 * spacings <= installed).then(|| Position::of_lobe(2 * spacings, installed, 2))?;
     let center = flank.locus().at(position).unwrap();
     Some(flank.radius_mm(&center, &flank.at(&center)))
 }

@@ -10,7 +10,7 @@ use crate::springs::{Rotation, Spring};
 use crate::tooth::Pressure;
 
 /// Stress that limits the torque at one input angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TorqueLimit {
     /// Torque at the wave generator at which the stress is reached.
     pub input_torque_nmm: f64,
@@ -18,33 +18,9 @@ pub struct TorqueLimit {
     pub contact: Contact,
     /// True if no contact reaches its stress: at a larger torque the wave generator would rotate past the teeth.
     pub turns_past_teeth: bool,
-    /// End of Johnson's law, if it comes before any stress is reached. The torque is then the one at that end, and the
-    /// limit is higher.
-    pub law_end: Option<LawEnd>,
-}
-
-/// End of Johnson's law for the teeth at one input angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LawEnd {
-    contact: Contact,
-    position_deg: f64,
-    half_width_limit_mm: f64,
-    input_torque_limit_nmm: f64,
-}
-
-impl LawEnd {
-    /// Returns the error for a load or a torque capacity beyond this end.
-    pub(crate) fn error(self, is_of_capacity: bool) -> SolveError {
-        let Self { contact, position_deg, half_width_limit_mm, input_torque_limit_nmm } = self;
-        let input_torque_limit_nm = 1e-3 * input_torque_limit_nmm;
-        SolveError::JohnsonBeyondHalfWidth {
-            contact,
-            position_deg,
-            half_width_limit_mm,
-            input_torque_limit_nm,
-            is_of_capacity,
-        }
-    }
+    /// The error of Johnson's law, if it ends before any stress is reached. The torque is then the one at that end, and
+    /// the limit is higher.
+    pub law_end: Option<SolveError>,
 }
 
 /// The first of many contacts to reach its limit.
@@ -78,9 +54,8 @@ impl<'a> LoadedDrive<'a> {
         let summit = self.springs(teeth).summit_before(limit.as_ref().map(|limit| &limit.rotation))?;
         let rotation = summit.map(|summit| summit.rotation).or(limit.as_ref().map(|limit| limit.rotation));
         let rotation = rotation.ok_or_else(|| self.carries_nothing(teeth))?;
-        if let Some(end) = self.law_end(teeth, &rotation)? {
-            let LawEnd { contact, input_torque_limit_nmm: input_torque_nmm, .. } = end;
-            return Ok(TorqueLimit { input_torque_nmm, contact, turns_past_teeth: false, law_end: Some(end) });
+        if let Some(end) = self.law_end(teeth, &rotation, true)? {
+            return Ok(end);
         }
         let input_torque_nmm = self.springs(teeth).torque_nmm(&rotation)?.value;
         let contact = match limit {
@@ -133,8 +108,14 @@ impl<'a> LoadedDrive<'a> {
         least.map(|(_, limit)| limit)
     }
 
-    /// Returns the end of Johnson's law if some contact is wider at this rotation than the law allows.
-    pub(super) fn law_end(&self, teeth: &[ToothState], rotation: &Rotation) -> Result<Option<LawEnd>, SolveError> {
+    /// Returns the end of Johnson's law, as a limit of the load or of the torque capacity, if some contact is wider at
+    /// this rotation than the law allows.
+    pub(super) fn law_end(
+        &self,
+        teeth: &[ToothState],
+        rotation: &Rotation,
+        is_of_capacity: bool,
+    ) -> Result<Option<TorqueLimit>, SolveError> {
         let tooth_radius_mm = self.drive.parameters().tooth_radius_mm;
         let Some(length_mm) = self.law.reference_length_mm(tooth_radius_mm) else { return Ok(None) };
         let is_beyond = |tooth: &ToothState| tooth.spring.displacement_mm(rotation) >= tooth.spring.approach.limit_mm();
@@ -155,11 +136,14 @@ impl<'a> LoadedDrive<'a> {
             share * share / tooth.force_ratio.get(contact)
         });
         let FirstLimit { tooth, contact, rotation } = limit.ok_or_else(|| self.carries_nothing(teeth))?;
-        Ok(Some(LawEnd {
+        let input_torque_nmm = self.springs(teeth).torque_nmm(&rotation)?.value;
+        let error = SolveError::JohnsonBeyondHalfWidth {
             contact,
             position_deg: tooth.center.position.from_lobe_deg(),
             half_width_limit_mm: limit_mm(contact),
-            input_torque_limit_nmm: self.springs(teeth).torque_nmm(&rotation)?.value,
-        }))
+            input_torque_limit_nm: 1e-3 * input_torque_nmm,
+            is_of_capacity,
+        };
+        Ok(Some(TorqueLimit { input_torque_nmm, contact, turns_past_teeth: false, law_end: Some(error) }))
     }
 }

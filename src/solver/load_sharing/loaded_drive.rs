@@ -6,7 +6,7 @@ use super::equilibrium::{Compatibility, ToothState};
 use super::load::LoadCase;
 use crate::SolveError;
 use crate::contact::{Contact, HertzLine, PerContact};
-use crate::contact_law::{ContactLaw, ToothSize};
+use crate::contact_law::ContactLaw;
 use crate::drive::{Drive, ToothShape};
 use crate::gaps::{Deviations, Gaps};
 use crate::mesh::{Mesh, Place};
@@ -14,7 +14,7 @@ use crate::ring::TipCorner;
 use crate::ring_bending::RingBending;
 use crate::root::NotConverged;
 use crate::springs::{Springs, WindUp};
-use crate::tooth::{BallContact, Contacts, Flat, ToothContact, ToothLaw};
+use crate::tooth::{BallContact, Contacts, Flat};
 use crate::violation::{Parameter, Violation};
 
 /// A drive under a load, with everything precomputed that does not depend on the position.
@@ -42,48 +42,33 @@ impl<'a> LoadedDrive<'a> {
     ///
     /// # Errors
     /// [`SolveError::NoToothInMesh`] and [`SolveError::ComplianceNotPositive`] if no finite forces exist,
-    /// [`SolveError::Impossible`] if the drive cannot have the load's clearances.
+    /// [`SolveError::Impossible`] if the drive cannot have the load's clearances or its law.
     pub fn new(drive: &'a Drive, load: &LoadCase) -> Result<Self, SolveError> {
-        Self::with_deviations(drive, load, &ToothContact::of(drive, load.parameters().carrier), None)
+        Self::with_deviations(drive, load, None)
     }
 
-    /// Builds the drive under the load, with deviations of its parts.
+    /// Builds the drive under the load, with deviations of its parts. Zones are then not alike: [`Self::wind_up`] needs
+    /// the teeth of all zones, made by [`Self::tooth_at`].
     ///
     /// # Errors
-    /// As [`Self::with_deviations`].
-    pub(crate) fn deviating(drive: &'a Drive, load: &LoadCase, deviations: &'a Deviations) -> Result<Self, SolveError> {
-        Self::with_deviations(drive, load, &ToothContact::of(drive, load.parameters().carrier), Some(deviations))
+    /// As [`Self::new`], and [`SolveError::Impossible`] if a list has a wrong length or `projection` gets deviations.
+    pub fn deviating(drive: &'a Drive, load: &LoadCase, deviations: &'a Deviations) -> Result<Self, SolveError> {
+        Self::with_deviations(drive, load, Some(deviations))
     }
 
-    /// Builds the drive under the load, with teeth of another shape.
-    ///
-    /// # Errors
-    /// As [`Self::new`], and [`SolveError::Impossible`] if the law does not apply to such teeth.
-    pub fn with_teeth(drive: &'a Drive, load: &LoadCase, shape: &ToothContact) -> Result<Self, SolveError> {
-        Self::with_deviations(drive, load, shape, None)
-    }
-
-    /// Builds the drive under the load, with teeth of another shape and deviations of its parts. Zones are then not
-    /// alike: [`Self::wind_up`] needs the teeth of all zones, made by [`Self::tooth_at`].
-    ///
-    /// # Errors
-    /// As [`Self::with_teeth`], and [`SolveError::Impossible`] if a list has a wrong length or `projection` gets
-    /// deviations.
-    pub fn with_deviations(
+    fn with_deviations(
         drive: &'a Drive,
         load: &LoadCase,
-        shape: &ToothContact,
         deviations: Option<&'a Deviations>,
     ) -> Result<Self, SolveError> {
         let p = load.parameters();
-        let size = ToothSize { radius_mm: drive.parameters().tooth_radius_mm, width_mm: drive.tooth_width_mm() };
-        let contacts = Contacts::new(shape, &p.law, &p.materials, size, &p.series_compliance_mm_per_n)
-            .ok_or_else(|| {
-                SolveError::Impossible(vec![Violation::conflict(
-                    Parameter::Law,
-                    "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have",
-                )])
-            })?;
+        let contacts = Contacts::new(drive, p.carrier, &p.law, &p.materials, &p.series_compliance_mm_per_n);
+        let contacts = contacts.ok_or_else(|| {
+            SolveError::Impossible(vec![Violation::conflict(
+                Parameter::Law,
+                "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have",
+            )])
+        })?;
         let mesh = load.mesh(drive, deviations.unwrap_or(&Deviations::default()));
         let tip_corner = if load.presses_corners(drive) { TipCorner::of(drive.ring_tooth())? } else { None };
         let loaded = Self {
@@ -161,13 +146,13 @@ impl<'a> LoadedDrive<'a> {
 
     /// Returns true if the law is linear and uniform and no contact has a gap. Unit loads then only have to be scaled.
     pub(crate) fn is_linear(&self) -> bool {
-        matches!(self.tooth_law(), Some(ToothLaw::Linear { .. })) && self.flat().is_none() && self.gaps.is_nil()
+        self.contacts_in_columns().is_some_and(Contacts::are_linear) && self.gaps.is_nil()
     }
 
-    /// Returns the law for column-wise evaluation, or none if it varies with the position.
-    pub(crate) fn tooth_law(&self) -> Option<ToothLaw> {
-        let is_plain = self.ring_bending.is_none() && !self.wave_generator_moves && self.tip_corner.is_none();
-        self.contacts.tooth_law().filter(|_| is_plain)
+    /// Returns the contacts for column-wise evaluation, or none if more than their own law decides about the load.
+    pub(crate) fn contacts_in_columns(&self) -> Option<&Contacts> {
+        let are_alone = self.ring_bending.is_none() && !self.wave_generator_moves && self.tip_corner.is_none();
+        are_alone.then_some(&self.contacts)
     }
 
     /// Returns true if listed teeth may carry nothing because of an open gap.
@@ -251,8 +236,8 @@ impl<'a> LoadedDrive<'a> {
     /// [`SolveError::NoLeverArm`] if none can carry, [`SolveError::JohnsonBeyondHalfWidth`] if that law ends before.
     pub fn wind_up(&self, teeth: &[ToothState]) -> Result<WindUp, SolveError> {
         let wind_up = self.springs(teeth).wind_up(self.input_torque_nmm)?.ok_or_else(|| self.carries_nothing(teeth))?;
-        if let Some(end) = self.law_end(teeth, &wind_up.rotation)? {
-            return Err(end.error(false));
+        if let Some(error) = self.law_end(teeth, &wind_up.rotation, false)?.and_then(|end| end.law_end) {
+            return Err(error);
         }
         Ok(WindUp { lost_motion_rad: self.lost_motion_rad(), ..wind_up })
     }

@@ -86,16 +86,17 @@ pub(crate) fn moments(
     let found = match in_columns {
         Some(found) => found,
         None => {
-            let mut look = PlainLook::new(loaded, load, stop);
+            let plain = PlainLook::new(loaded, load, stop);
             // The plain path covers every moment.
-            search(&mut look, pieces(), tolerance, Some(resolution), stop)?.unwrap_or_default()
+            let look = |fractions: &[f64], seen: &mut Seen| plain.look(fractions, seen).map(|()| true);
+            search(&plain.searched()?, pieces(), tolerance, Some(resolution), stop, look)?.unwrap_or_default()
         }
     };
     let mut by_lap = vec![Vec::new(); usize::try_from(laps).unwrap_or(usize::MAX)];
     // If lever arms vary, a tooth is pressed before it is lifted, because it is then behind the valley.
     let loads_jump = mesh.loads_jump_at_entry() || load.parameters().wave_generator_moves;
     let without_load = if tolerance.looks_without_load() && loaded.has_gaps() {
-        unloaded::extremes(PlainLook::new(loaded, load, stop), pieces(), tolerance, stop)?
+        unloaded::extremes(&PlainLook::new(loaded, load, stop), pieces(), tolerance, stop)?
     } else {
         Vec::new()
     };

@@ -5,8 +5,7 @@ mod peaks;
 mod states;
 
 pub use checks::TorqueBalance;
-pub(crate) use checks::{check, finished, worse};
-pub(crate) use peaks::AngleExtremes;
+pub(crate) use checks::{check, checked, worse};
+pub(crate) use peaks::{AngleExtremes, PeaksSoFar};
 pub use peaks::{ContactPeaks, Extremes, Peak, SweepPeaks, TorqueCapacity};
-pub(crate) use states::{Columns, PeakAt};
 pub use states::{InputAngles, States, Sweep};

@@ -52,14 +52,13 @@ use crate::position::Position;
 use crate::sweep::columns::{self, ContactPeaks, Peak, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity};
 use crate::sweep::points::{Points, Tolerance};
 use crate::sweep::search::{Best, Found, Piece, search};
-use crate::tooth::ToothLaw;
 use crate::{SolveError, Stop};
 
 /// Returns the sweep and its capacity for an allowable stress. Returns none if the plain path has to compute it: for
 /// laws without columns, possible interference, and drives beyond the limits.
 ///
 /// # Errors
-/// As [`columns::finished`].
+/// As [`columns::checked`].
 pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
@@ -71,14 +70,11 @@ pub(crate) fn sweep(
     let Some(kernel) = Kernel::new(&one_zone, allowable_mpa) else { return Ok(None) };
     let laps = Laps::new(loaded.mesh(), samples);
     let mut sink = ColumnSink::new(&laps);
-    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(&one_zone, &laps, stop, &mut sink)? else {
-        return Ok(None);
-    };
-    let columns = sink.columns(torque_balance_residual);
-    let mut sweep = columns::finished(loaded, Points::Samples(samples), columns, None)?;
-    sweep.torque_capacity = capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &sweep.peaks));
+    let Some(filled) = kernel.fill(&one_zone, &laps, stop, &mut sink)? else { return Ok(None) };
+    let mut sweep = sink.sweep(loaded.drive(), filled);
+    sweep.torque_capacity = sweep.torque_capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &sweep.peaks));
     kernel.complete(loaded, load, &mut sweep.peaks)?;
-    Ok(Some(sweep))
+    columns::checked(sweep, loaded, Points::Samples(samples)).map(Some)
 }
 
 /// Returns the peaks of the same sweep without its states, for zones that are alike; none in the cases of [`sweep`].
@@ -93,13 +89,13 @@ pub(crate) fn peaks(
 ) -> Result<Option<SweepPeaks>, SolveError> {
     let allowable_mpa = load.parameters().allowable_stress_mpa;
     let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
-    let (laps, mut sink) = (Laps::new(loaded.mesh(), samples), PeakSink::default());
-    let Some(Filled { torque_balance_residual, capacity }) = kernel.fill(loaded, &laps, stop, &mut sink)? else {
+    let (laps, mut sink) = (Laps::new(loaded.mesh(), samples), PeakSink::new());
+    let Some(Filled { torque_balance_residual, torque_capacity }) = kernel.fill(loaded, &laps, stop, &mut sink)? else {
         return Ok(None);
     };
     columns::check("torque balance", torque_balance_residual)?;
     let mut peaks = sink.peaks(loaded.drive(), torque_balance_residual);
-    peaks.torque_capacity = capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &peaks.contacts));
+    peaks.torque_capacity = torque_capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &peaks.contacts));
     kernel.complete(loaded, load, &mut peaks.contacts)?;
     Ok(Some(peaks))
 }
@@ -123,7 +119,7 @@ pub(crate) fn moments(
     let size = kernel.tile_size(loaded.mesh(), layout);
     let mut arena = vec![0.0; size.doubles()];
     let mut look = FastLook::new(&kernel, &one_zone, (*loaded.mesh(), layout), &size, &mut arena, stop);
-    search(&mut look, pieces, tolerance, Some(resolution), stop)
+    search(&look.searched(), pieces, tolerance, Some(resolution), stop, |fractions, seen| look.look(fractions, seen))
 }
 
 /// Returns the true peaks to a tolerance; none in the cases of [`sweep`].
@@ -142,9 +138,9 @@ pub(crate) fn true_peaks(
     let size = kernel.tile_size(&mesh, Layout::PLAIN);
     let mut arena = vec![0.0; size.doubles()];
     let mut look = FastLook::new(&kernel, loaded, (mesh, Layout::PLAIN), &size, &mut arena, stop);
-    let Some(Found { seen, best }) = search(&mut look, Piece::of(loaded, 0), tolerance, None, stop)? else {
-        return Ok(None);
-    };
+    let pieces = Piece::of(loaded, 0);
+    let found = search(&look.searched(), pieces, tolerance, None, stop, |fractions, seen| look.look(fractions, seen))?;
+    let Some(Found { seen, best }) = found else { return Ok(None) };
     columns::check("torque balance", look.torque_balance_residual)?;
     let drive = loaded.drive();
     let peak = |Best { value, piece, moment, tooth }| {
@@ -203,7 +199,7 @@ struct Kernel {
 /// Results of a sweep that are not in its sink.
 struct Filled {
     torque_balance_residual: f64,
-    capacity: Option<TorqueCapacity>,
+    torque_capacity: Option<TorqueCapacity>,
 }
 
 /// Load-sharing method.
@@ -215,17 +211,23 @@ enum Law {
     Sharing(Sharing),
 }
 
+impl Law {
+    /// Returns true if all loads are proportional, whatever the torque.
+    const fn is_in_proportion(&self) -> bool {
+        match self {
+            Self::Linear(_) => true,
+            Self::Sharing(sharing) => sharing.is_in_proportion(),
+        }
+    }
+}
+
 impl Kernel {
     fn new(loaded: &LoadedDrive<'_>, allowable_mpa: Option<PerContact<f64>>) -> Option<Self> {
-        let law = match loaded.tooth_law()? {
-            ToothLaw::Linear { compliance_mm_per_n } if loaded.is_linear() => {
-                Law::Linear(Compliance::new(&compliance_mm_per_n, loaded))
+        let law = match Sharing::new(loaded)? {
+            Sharing::Linear(law) if loaded.is_linear() => {
+                Law::Linear(Compliance::new(&law.power.compliance_mm_per_n, loaded))
             }
-            _ => Law::Sharing(Sharing::new(loaded)?),
-        };
-        let is_in_proportion = match &law {
-            Law::Linear(_) => true,
-            Law::Sharing(sharing) => sharing.is_in_proportion(),
+            sharing => Law::Sharing(sharing),
         };
         let drive = loaded.drive();
         let pressures = Pressures::new(loaded)?;
@@ -236,13 +238,13 @@ impl Kernel {
             r,
             ring_teeth_per_wave: drive.flank().teeth_per_wave(),
             teeth_per_wave: drive.teeth_per_wave(),
-            law,
             gaps: GapColumns::new(loaded),
             hertz: pressures.hertz(loaded),
             pressures,
             cam_terms: arctangent_terms(ratios.wave_generator)?,
             ring_terms: arctangent_terms(ratios.ring)?,
-            allowable_mpa: allowable_mpa.filter(|_| !is_in_proportion),
+            allowable_mpa: allowable_mpa.filter(|_| !law.is_in_proportion()),
+            law,
         })
     }
 
@@ -331,7 +333,7 @@ impl Kernel {
         let step_rad = laps.stride as f64 * mesh.phase_step_rad(laps.of_lap);
         let mut tile = Tile::new(&mut arena, &size, step_rad, self.pressures.stress_exponents());
         let balance = TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm());
-        let mut filled = Filled { torque_balance_residual: 0.0, capacity: None };
+        let mut filled = Filled { torque_balance_residual: 0.0, torque_capacity: None };
         let mut lap_teeth = LapTeeth::default();
         for residue in 0..laps.stride {
             let mut first = residue;
@@ -365,7 +367,8 @@ impl Kernel {
                             };
                             if let Some(limit) = limit {
                                 let limit_deg = laps.input_angle_deg(sample + limit.row as u64);
-                                filled.capacity = least(filled.capacity, limit.capacity(loaded, limit_deg));
+                                filled.torque_capacity =
+                                    least(filled.torque_capacity, limit.capacity(loaded, limit_deg));
                             }
                             filled.torque_balance_residual =
                                 Self::residual(&balance, rows, &mut tile, filled.torque_balance_residual);

@@ -86,9 +86,6 @@ pub fn sweep_with_deviations(
     points: Points,
     stop: &dyn Stop,
 ) -> Result<Sweep, SolveError> {
-    if deviations.is_nil() && deviations.violations(drive.parameters()).is_empty() {
-        return sweep(drive, load, points, stop);
-    }
     swept(&LoadedDrive::deviating(drive, load, deviations)?, load, points, stop)
 }
 

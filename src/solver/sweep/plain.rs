@@ -1,68 +1,18 @@
 //! Sweep state by state: the reference for the fast path, and the fallback for drives it does not support.
 
-use crate::contact::{Contact, Materials, PerContact};
-use crate::load_sharing::{LawEnd, LoadCase, LoadedDrive, ToothState, TorqueLimit};
+use crate::contact::{Materials, PerContact};
+use crate::load_sharing::{LoadCase, LoadedDrive, ToothState, TorqueLimit};
 use crate::mesh::{PlacedTooth, Samples};
 use crate::root::NotConverged;
 use crate::springs::WindUp;
 use crate::sweep::adaptive::{self, Looking};
 use crate::sweep::columns::{
-    AngleExtremes, Columns, ContactPeaks, InputAngles, Peak, PeakAt, States, Sweep, SweepPeaks, TorqueBalance,
-    TorqueCapacity, check, finished, worse,
+    AngleExtremes, ContactPeaks, InputAngles, Peak, PeaksSoFar, States, Sweep, SweepPeaks, TorqueBalance,
+    TorqueCapacity, check, checked, worse,
 };
 use crate::sweep::points::Points;
 use crate::tooth::Pressure;
 use crate::{SolveError, Stop};
-
-/// Pressure with the largest stress of a contact so far.
-#[derive(Debug, Clone, Copy)]
-struct Hardest {
-    stress_mpa: f64,
-    force_n: f64,
-    pressure: Pressure,
-}
-
-impl States {
-    /// Returns the first of the largest values of a column and its index; none for an empty column.
-    fn first_peak(&self, column: &[f64]) -> Option<(usize, Peak)> {
-        let at = peak_at(column);
-        (!column.is_empty()).then(|| (at, self.peak(column, at)))
-    }
-
-    /// Removes all states and keeps their memory.
-    fn clear(&mut self) {
-        let Self {
-            input_angle_deg,
-            tooth,
-            lobe,
-            position_deg,
-            center_radius_mm,
-            wave_generator_angle_deg,
-            ring_angle_deg,
-            force_n,
-            stress_mpa,
-        } = self;
-        let of_places = [input_angle_deg, position_deg, center_radius_mm, wave_generator_angle_deg, ring_angle_deg];
-        of_places.into_iter().for_each(Vec::clear);
-        tooth.clear();
-        lobe.clear();
-        force_n.clear();
-        stress_mpa.clear();
-    }
-}
-
-impl InputAngles {
-    fn clear(&mut self) {
-        let Self { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth } = self;
-        [input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad].into_iter().for_each(Vec::clear);
-        loaded_teeth.clear();
-    }
-}
-
-/// Returns the index of the first of the largest values of a column.
-fn peak_at(column: &[f64]) -> usize {
-    column.iter().enumerate().fold(0, |at, (index, &value)| if value > column[at] { index } else { at })
-}
 
 /// Runs the sweep.
 ///
@@ -79,7 +29,7 @@ pub(crate) fn sweep(
     let mut columns = Growing::new(loaded, load.parameters().allowable_stress_mpa);
     match points {
         Points::Samples(samples) => {
-            columns.reserve(mesh.state_count(samples));
+            columns.begin(mesh.state_count(samples), mesh.last_sample(samples) + 1);
             for sample in 0..=mesh.last_sample(samples) {
                 if stop.stopped() {
                     return Err(SolveError::Stopped);
@@ -122,82 +72,21 @@ pub(crate) fn peaks(
     samples: Samples,
     stop: &dyn Stop,
 ) -> Result<SweepPeaks, SolveError> {
-    const STATES_AT_A_TIME: usize = 1024;
+    const STATES_AT_A_TIME: u64 = 1024;
     let mesh = *loaded.mesh();
     let mut columns = Growing::new(loaded, load.parameters().allowable_stress_mpa);
-    let mut seen = SeenSoFar::default();
     for sample in 0..=mesh.last_sample(samples) {
         if stop.stopped() {
             return Err(SolveError::Stopped);
         }
+        if sample == 0 || columns.states.len() as u64 >= STATES_AT_A_TIME {
+            columns.begin(2 * STATES_AT_A_TIME, STATES_AT_A_TIME);
+        }
         columns.add(mesh.input_angle_deg(sample, samples), mesh.placed_at(sample, samples))?;
-        if columns.states.len() >= STATES_AT_A_TIME {
-            seen.take(&mut columns);
-        }
     }
-    seen.take(&mut columns);
-    if let Some(end) = columns.law_end {
-        return Err(end.error(true));
-    }
+    let contacts = columns.contact_peaks(&load.parameters().materials)?;
     check("torque balance", columns.torque_balance_residual)?;
-    let contacts = PerContact::of(|contact| {
-        let &SeenAt { force_n, stress_mpa, force_at_stress_n } = seen.contacts.get(contact);
-        let peaks = ContactPeaks::of_line(force_n, stress_mpa, force_at_stress_n, loaded.drive().tooth_width_mm());
-        columns.complete(peaks, &load.parameters().materials, contact)
-    });
-    Ok(seen.angles.peaks(contacts, columns.torque_capacity, columns.torque_balance_residual))
-}
-
-/// Summary of the states that are no longer kept.
-struct SeenSoFar {
-    contacts: PerContact<SeenAt>,
-    angles: AngleExtremes,
-}
-
-/// First of the largest values at a contact.
-#[derive(Debug, Clone, Copy)]
-struct SeenAt {
-    force_n: Peak,
-    stress_mpa: Peak,
-    force_at_stress_n: f64,
-}
-
-impl Default for SeenSoFar {
-    fn default() -> Self {
-        let none = Peak { value: f64::NEG_INFINITY, input_angle_deg: 0.0, position_deg: 0.0 };
-        Self {
-            contacts: PerContact::of(|_| SeenAt { force_n: none, stress_mpa: none, force_at_stress_n: 0.0 }),
-            angles: AngleExtremes::NONE,
-        }
-    }
-}
-
-impl SeenSoFar {
-    /// Summarises the states collected so far and clears them.
-    fn take(&mut self, columns: &mut Growing<'_>) {
-        let Growing { states, input_angles, .. } = columns;
-        self.contacts = PerContact::of(|contact| {
-            let mut seen = *self.contacts.get(contact);
-            let (forces_n, stresses_mpa) = (states.force_n.get(contact), states.stress_mpa.get(contact));
-            if let Some((_, force_n)) = states.first_peak(forces_n).filter(|(_, peak)| peak.value > seen.force_n.value)
-            {
-                seen.force_n = force_n;
-            }
-            let stress_mpa = states.first_peak(stresses_mpa);
-            if let Some((at, stress_mpa)) = stress_mpa.filter(|(_, peak)| peak.value > seen.stress_mpa.value) {
-                (seen.stress_mpa, seen.force_at_stress_n) = (stress_mpa, forces_n[at]);
-            }
-            seen
-        });
-        let InputAngles { wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth, .. } = input_angles;
-        for ((&wind_up_deg, &stiffness), &teeth) in
-            wind_up_deg.iter().zip(&*torsional_stiffness_nm_per_rad).zip(&*loaded_teeth)
-        {
-            self.angles.see(wind_up_deg, stiffness, u64::from(teeth));
-        }
-        states.clear();
-        input_angles.clear();
-    }
+    Ok(columns.angles.peaks(contacts, columns.torque_capacity, columns.torque_balance_residual))
 }
 
 /// Sweep that is built input angle by input angle.
@@ -208,12 +97,15 @@ struct Growing<'a> {
     input_angles: InputAngles,
     torque_capacity: Option<TorqueCapacity>,
     /// Set if the least limit is the end of Johnson's law instead of a stress.
-    law_end: Option<LawEnd>,
+    law_end: Option<SolveError>,
     balance: TorqueBalance,
     torque_balance_residual: f64,
     lists_lobes: bool,
     teeth: Vec<ToothState>,
-    hardest: PerContact<Option<Hardest>>,
+    angles: AngleExtremes,
+    peaks: PerContact<PeaksSoFar>,
+    /// Pressure model in the state of each stress peak.
+    pressures: PerContact<Option<Pressure>>,
 }
 
 impl<'a> Growing<'a> {
@@ -229,13 +121,18 @@ impl<'a> Growing<'a> {
             torque_balance_residual: 0.0,
             lists_lobes: !loaded.mesh().zones_are_alike(),
             teeth: Vec::new(),
-            hardest: PerContact::default(),
+            angles: AngleExtremes::NONE,
+            peaks: PerContact::of(|_| PeaksSoFar::NONE),
+            pressures: PerContact::default(),
         }
     }
 
-    fn reserve(&mut self, states: u64) {
-        // The caller has bounded the count to what fits in memory.
-        self.states = States::with_capacity(usize::try_from(states).unwrap_or(usize::MAX));
+    /// Begins empty columns, with memory for as many states and input angles.
+    fn begin(&mut self, states: u64, input_angles: u64) {
+        // The caller has bounded the counts to what fits in memory.
+        let [states, input_angles] = [states, input_angles].map(|count| usize::try_from(count).unwrap_or(usize::MAX));
+        self.states = States::with_capacity(states, self.lists_lobes);
+        self.input_angles = InputAngles::with_capacity(input_angles);
     }
 
     /// Appends the states of the teeth in mesh at one input angle.
@@ -252,8 +149,11 @@ impl<'a> Growing<'a> {
             self.states.position_deg.push(position_deg);
         }
         let wind_up = self.loaded.wind_up(&self.teeth)?;
-        let loaded_teeth = self.share_load(&wind_up)?;
-        self.input_angles.push(self.loaded.drive(), input_angle_deg, &wind_up, loaded_teeth);
+        let loaded_teeth = self.share_load(input_angle_deg, &wind_up)?;
+        let stiffness = InputAngles::of_output(self.loaded.drive(), wind_up.stiffness_nmm_per_rad);
+        let wind_up_deg = wind_up.rotation_rad().to_degrees();
+        self.input_angles.push(input_angle_deg, wind_up_deg, stiffness, loaded_teeth);
+        self.angles.see(wind_up_deg, stiffness, u64::from(loaded_teeth));
         if let Some(allowable_stress_mpa) = &self.allowable_stress_mpa {
             let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa)?;
             let input_torque_nm = 1e-3 * limit.input_torque_nmm;
@@ -274,13 +174,14 @@ impl<'a> Growing<'a> {
     }
 
     /// Appends geometry, forces and stresses of the teeth. Returns the number of teeth that carry load.
-    fn share_load(&mut self, wind_up: &WindUp) -> Result<usize, NotConverged> {
+    fn share_load(&mut self, input_angle_deg: f64, wind_up: &WindUp) -> Result<u32, NotConverged> {
         let flank = self.loaded.drive().flank();
         let states = &mut self.states;
         let mut loaded_teeth = 0;
         let zones = self.loaded.zones();
         let mut torque_nmm = PerContact::<f64>::default();
-        for tooth in &self.teeth {
+        let first = states.len() - self.teeth.len();
+        for (tooth, &position_deg) in self.teeth.iter().zip(&states.position_deg[first..]) {
             let ToothState { center, flank: point, .. } = tooth;
             states.center_radius_mm.push(center.center_radius_mm);
             let cam_angle_rad = flank.locus().contact_angle_from_valley_rad(center);
@@ -288,14 +189,18 @@ impl<'a> Growing<'a> {
             states.ring_angle_deg.push(flank.angle_from_tip_rad(center, point).to_degrees());
 
             let force_n = self.loaded.forces_n(tooth, wind_up)?;
-            loaded_teeth += usize::from(force_n.wave_generator > 0.0);
+            loaded_teeth += u32::from(force_n.wave_generator > 0.0);
             let stress_mpa = self.loaded.stress_mpa(tooth, &force_n);
             for (contact, &stress_mpa) in stress_mpa.iter() {
-                let hardest = self.hardest.get_mut(contact);
-                // The first of equal values, as among the states.
-                if hardest.is_none_or(|before| stress_mpa > before.stress_mpa) {
-                    let (force_n, pressure) = (*force_n.get(contact), *tooth.pressure.get(contact));
-                    *hardest = Some(Hardest { stress_mpa, force_n, pressure });
+                let (peaks, force_n) = (self.peaks.get_mut(contact), *force_n.get(contact));
+                let peak = |value| Peak { value, input_angle_deg, position_deg };
+                // The first of equal values counts.
+                if force_n > peaks.force_n.value {
+                    peaks.force_n = peak(force_n);
+                }
+                if stress_mpa > peaks.stress_mpa.value {
+                    (peaks.stress_mpa, peaks.force_at_stress_n) = (peak(stress_mpa), force_n);
+                    *self.pressures.get_mut(contact) = Some(*tooth.pressure.get(contact));
                 }
             }
             states.force_n.push(force_n);
@@ -323,37 +228,35 @@ impl<'a> Growing<'a> {
         Ok(loaded_teeth)
     }
 
-    /// Returns the peaks of a contact, completed from its hardest pressure.
-    fn complete(&self, peaks: ContactPeaks, materials: &Materials, contact: Contact) -> ContactPeaks {
-        match self.hardest.get(contact) {
-            Some(Hardest { force_n, pressure, .. }) => peaks.of_pressure(pressure, *force_n, materials, contact),
-            None => peaks,
+    /// Returns the peaks of each contact, or an error if the law ends before the torque capacity.
+    fn contact_peaks(&self, materials: &Materials) -> Result<PerContact<ContactPeaks>, SolveError> {
+        if let Some(error) = &self.law_end {
+            return Err(error.clone());
         }
+        Ok(PerContact::of(|contact| {
+            let peaks = self.peaks.get(contact);
+            let of_line = peaks.of_line(self.loaded.drive().tooth_width_mm());
+            self.pressures
+                .get(contact)
+                .map_or(of_line, |pressure| of_line.of_pressure(&pressure, peaks.force_at_stress_n, materials, contact))
+        }))
     }
 
-    fn finish(mut self, points: Points, materials: &Materials) -> Result<Sweep, SolveError> {
-        if let Some(end) = self.law_end {
-            return Err(end.error(true));
-        }
-        let states = std::mem::take(&mut self.states);
-        let peaks = PerContact::of(|contact| PeakAt {
-            force: peak_at(states.force_n.get(contact)),
-            stress: peak_at(states.stress_mpa.get(contact)),
-        });
-        let input_angles = std::mem::take(&mut self.input_angles);
-        let columns = Columns { states, input_angles, peaks, torque_balance_residual: self.torque_balance_residual };
-        let mut sweep = finished(self.loaded, points, columns, self.torque_capacity)?;
-        sweep.peaks = PerContact::of(|contact| self.complete(*sweep.peaks.get(contact), materials, contact));
-        Ok(sweep)
+    fn finish(self, points: Points, materials: &Materials) -> Result<Sweep, SolveError> {
+        let sweep = Sweep {
+            mesh: *self.loaded.mesh(),
+            peaks: self.contact_peaks(materials)?,
+            states: self.states,
+            input_angles: self.input_angles,
+            torque_capacity: self.torque_capacity,
+            torque_balance_residual: self.torque_balance_residual,
+            period_closure_residual: 0.0,
+        };
+        checked(sweep, self.loaded, points)
     }
 }
 
 impl PerContact<Vec<f64>> {
-    fn clear(&mut self) {
-        let Self { wave_generator, ring, carrier } = self;
-        [wave_generator, ring, carrier].into_iter().for_each(Vec::clear);
-    }
-
     fn push(&mut self, values: PerContact<f64>) {
         self.wave_generator.push(values.wave_generator);
         self.ring.push(values.ring);

@@ -3,8 +3,7 @@
 use crate::contact::PerContact;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
 use crate::mesh::Mesh;
-use crate::root::NotConverged;
-use crate::sweep::search::{LOADS, Look, Piece, Seen};
+use crate::sweep::search::{LOADS, Piece, SearchedDrive, Seen};
 use crate::{SolveError, Stop};
 
 /// Evaluates moments tooth by tooth.
@@ -15,7 +14,6 @@ pub(crate) struct PlainLook<'a> {
     mesh: Mesh,
     allowable_stress_mpa: Option<PerContact<f64>>,
     has_gaps: bool,
-    is_linear: bool,
     stop: &'a dyn Stop,
 }
 
@@ -28,7 +26,6 @@ impl<'a> PlainLook<'a> {
             mesh,
             allowable_stress_mpa: load.parameters().allowable_stress_mpa,
             has_gaps: loaded.has_gaps() || tells_items_apart,
-            is_linear: loaded.is_linear(),
             stop,
         }
     }
@@ -63,34 +60,28 @@ impl<'a> PlainLook<'a> {
         placed.sort_by(|one, other| one.position.from_lobe_rad.total_cmp(&other.position.from_lobe_rad));
         placed.iter().map(|tooth| self.loaded.tooth_at(&tooth.place, tooth.position)).collect()
     }
-}
 
-impl Look for PlainLook<'_> {
-    fn distance_at_corner_rad(&self) -> Result<f64, NotConverged> {
-        self.loaded.distance_at_corner_rad()
+    /// Returns what the search needs to know.
+    ///
+    /// # Errors
+    /// [`NotConverged`](crate::root::NotConverged) from the path.
+    pub(crate) fn searched(&self) -> Result<SearchedDrive, SolveError> {
+        let (loaded, mesh) = (&self.loaded, &self.mesh);
+        Ok(SearchedDrive {
+            has_gaps: self.has_gaps,
+            is_linear: loaded.is_linear(),
+            is_in_proportion: loaded.is_linear(),
+            input_torque_nmm: loaded.input_torque_nmm(),
+            distance_at_corner_rad: loaded.distance_at_corner_rad()?,
+            teeth_at_each_place: if mesh.tells_items_apart() { mesh.listed_at_each_place() } else { 1 },
+        })
     }
 
-    fn has_gaps(&self) -> bool {
-        self.has_gaps
-    }
-
-    fn is_linear(&self) -> bool {
-        self.is_linear
-    }
-
-    fn is_in_proportion(&self) -> bool {
-        self.is_linear
-    }
-
-    fn input_torque_nmm(&self) -> f64 {
-        self.loaded.input_torque_nmm()
-    }
-
-    fn teeth_at_each_place(&self) -> u64 {
-        if self.mesh.tells_items_apart() { self.mesh.listed_at_each_place() } else { 1 }
-    }
-
-    fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
+    /// Appends moments of a piece.
+    ///
+    /// # Errors
+    /// The reason why there is no answer.
+    pub(crate) fn look(&self, fractions: &[f64], seen: &mut Seen) -> Result<(), SolveError> {
         let piece = seen.piece;
         for &fraction in fractions {
             let teeth = self.teeth(&piece, fraction)?;
@@ -117,7 +108,7 @@ impl Look for PlainLook<'_> {
             let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
             values[LOADS * count..].copy_from_slice(&totals);
         }
-        Ok(true)
+        Ok(())
     }
 }
 
@@ -136,12 +127,12 @@ mod tests {
         });
         let case = case.expect("a possible load");
         let loaded = LoadedDrive::new(&drive, &case).expect("a possible case");
-        let mut look = PlainLook::new(&loaded, &case, &Never);
+        let look = PlainLook::new(&loaded, &case, &Never);
         for piece in Piece::of(&loaded, 0) {
             let count = usize::try_from(piece.places).expect("a few");
             let mut seen = Seen::new(piece, count);
             let fractions = [0.1, 0.5, 0.8].map(|share| piece.start + share * (piece.end - piece.start));
-            assert!(look.look(&fractions, &mut seen).expect("a look"));
+            look.look(&fractions, &mut seen).expect("a look");
             for moment in 0..fractions.len() {
                 let carry = seen.values(moment)[..count].iter().map(|&force_n| force_n > 0.0);
                 let are_pressed = seen.pressed(moment).iter().map(|&pressed_rad| pressed_rad > 0.0);

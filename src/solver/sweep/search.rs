@@ -100,37 +100,20 @@ const QUARTERS: [f64; 3] = [0.25, 0.5, 0.75];
 
 const TOWARDS_START: [f64; 3] = [1.0 / 64.0, 1.0 / 16.0, 0.25];
 
-/// Evaluates moments.
-pub(crate) trait Look {
-    /// Returns true if teeth begin and cease to carry between their entry and their exit.
-    fn has_gaps(&self) -> bool;
-
-    /// Returns true if forces are proportional to the teeth's displacements. Every curve is then smooth up to its ends.
-    fn is_linear(&self) -> bool;
-
-    /// Returns true if the stiffness is proportional to the reciprocal of the rotation, so that they share their
-    /// extremes.
-    fn is_in_proportion(&self) -> bool;
-
-    /// Returns `M0` in N·mm.
-    fn input_torque_nmm(&self) -> f64;
-
-    /// Returns a rotation that has the rounding error of a tooth's gap at a corner, if teeth press against corners.
-    ///
-    /// # Errors
-    /// [`NotConverged`] from the path.
-    fn distance_at_corner_rad(&self) -> Result<f64, NotConverged> {
-        Ok(0.0)
-    }
-
-    /// Returns the number of teeth that are distinguished at each place.
-    fn teeth_at_each_place(&self) -> u64;
-
-    /// Appends moments of a piece. Returns false if this method does not support the drive.
-    ///
-    /// # Errors
-    /// The reason why there is no answer.
-    fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError>;
+/// What a search needs to know of a drive under its load.
+pub(crate) struct SearchedDrive {
+    /// True if teeth begin and cease to carry between their entry and their exit.
+    pub(crate) has_gaps: bool,
+    /// True if forces are proportional to the teeth's displacements. Every curve is then smooth up to its ends.
+    pub(crate) is_linear: bool,
+    /// True if the stiffness is proportional to the reciprocal of the rotation, so that they share their extremes.
+    pub(crate) is_in_proportion: bool,
+    /// `M0`.
+    pub(crate) input_torque_nmm: f64,
+    /// Rotation that has the rounding error of a tooth's gap at a corner; 0 if no corner is pressed.
+    pub(crate) distance_at_corner_rad: f64,
+    /// Number of teeth that are distinguished at each place.
+    pub(crate) teeth_at_each_place: u64,
 }
 
 /// Largest value of a quantity.
@@ -161,21 +144,23 @@ struct Search {
     states: u64,
 }
 
-/// Searches for the largest value of every quantity. Returns none if this evaluation method does not support the drive.
+/// Searches for the largest value of every quantity. `look` appends moments of a piece, or returns false if it does not
+/// support the drive; then the result is none.
 ///
 /// # Errors
 /// Errors of the evaluation; [`SolveError::TooManyStates`] beyond the tolerance's limit, [`SolveError::Stopped`] if
 /// stopped.
 pub(crate) fn search(
-    look: &mut impl Look,
+    drive: &SearchedDrive,
     pieces: impl Iterator<Item = Piece>,
     tolerance: Tolerance,
     lines: Option<f64>,
     stop: &dyn Stop,
+    mut look: impl FnMut(&[f64], &mut Seen) -> Result<bool, SolveError>,
 ) -> Result<Option<Found>, SolveError> {
-    let teeth = |piece: &Piece| usize::try_from(piece.places * look.teeth_at_each_place()).unwrap_or(usize::MAX);
+    let teeth = |piece: &Piece| usize::try_from(piece.places * drive.teeth_at_each_place).unwrap_or(usize::MAX);
     let mut is_sought = [true; QUANTITIES];
-    if look.is_in_proportion() {
+    if drive.is_in_proportion {
         STIFFNESSES.iter().for_each(|&quantity| is_sought[quantity] = false);
     }
     let (mut seen, mut states) = (Vec::new(), 0_u64);
@@ -194,17 +179,17 @@ pub(crate) fn search(
     let mut search = Search { tolerance, lines, is_sought, seen, best: [Best::default(); QUANTITIES], states: 0 };
     let mut excess = 0.0;
     for round in 0..MAX_ROUNDS {
-        if !search.look(look)? {
+        if !search.look(&mut look)? {
             return Ok(None);
         }
-        excess = search.want(round, look.has_gaps(), look.is_linear());
+        excess = search.want(round, drive);
         let wanted: usize = search.seen.iter().map(|seen| seen.wanted.len()).sum();
         if wanted == 0 {
             return Ok(Some(Found { seen: search.seen, best: search.best }));
         }
     }
     // The remaining excess is more than rounding only if the curves are not smooth.
-    let rounding = search.rounding(look.input_torque_nmm(), look.distance_at_corner_rad()?);
+    let rounding = search.rounding(drive);
     if excess > tolerance.relative().max(OPEN).max(rounding) {
         return Err(NotConverged { what: "extremes of a sweep", iterations: MAX_ROUNDS, bracket_width: excess }.into());
     }
@@ -214,15 +199,19 @@ pub(crate) fn search(
 impl Search {
     /// Returns the effect of rounding of closing angles on the loads, including a bend counted several times. The
     /// amplification is `Δφ K/M`, with M the given or the allowed torque. If teeth press against corners, Δφ is at
-    /// least [`Look::distance_at_corner_rad`].
-    fn rounding(&self, input_torque_nmm: f64, distance_at_corner_rad: f64) -> f64 {
+    /// least [`SearchedDrive::distance_at_corner_rad`].
+    fn rounding(&self, drive: &SearchedDrive) -> f64 {
         let [rotation_rad, stiffness_nmm_per_rad] = [LOADS, STIFFNESSES[0]].map(|quantity| self.best[quantity].value);
-        let per_torque = self.best[CAPACITY].value.max(1.0 / input_torque_nmm);
-        ROUNDINGS * f64::EPSILON * (rotation_rad.max(distance_at_corner_rad) * stiffness_nmm_per_rad * per_torque)
+        let per_torque = self.best[CAPACITY].value.max(1.0 / drive.input_torque_nmm);
+        let rotation_rad = rotation_rad.max(drive.distance_at_corner_rad);
+        ROUNDINGS * f64::EPSILON * (rotation_rad * stiffness_nmm_per_rad * per_torque)
     }
 
     /// Evaluates the wanted moments.
-    fn look(&mut self, look: &mut impl Look) -> Result<bool, SolveError> {
+    fn look(
+        &mut self,
+        look: &mut impl FnMut(&[f64], &mut Seen) -> Result<bool, SolveError>,
+    ) -> Result<bool, SolveError> {
         for (piece, seen) in self.seen.iter_mut().enumerate() {
             let wanted = std::mem::take(&mut seen.wanted);
             if wanted.is_empty() {
@@ -234,7 +223,7 @@ impl Search {
                 return Err(SolveError::TooManyStates { limit });
             }
             let first = seen.fractions.len();
-            if !look.look(&wanted, seen)? {
+            if !look(&wanted, seen)? {
                 return Ok(false);
             }
             seen.put_in_order();
@@ -254,7 +243,7 @@ impl Search {
     }
 
     /// Records the fractions to evaluate next. Returns the relative amount by which a quantity may still rise.
-    fn want(&mut self, round: u32, has_gaps: bool, is_linear: bool) -> f64 {
+    fn want(&mut self, round: u32, drive: &SearchedDrive) -> f64 {
         let relative = self.tolerance.relative();
         let nearest = (1e-3 * relative).max(16.0 * f64::EPSILON);
         let judge = Judge {
@@ -262,13 +251,13 @@ impl Search {
             relative,
             nearest,
             is_late: round >= SMOOTH_ROUNDS,
-            is_linear,
+            is_linear: drive.is_linear,
             lines: self.lines,
             is_sought: self.is_sought,
         };
         let mut most = 0.0_f64;
         for seen in &mut self.seen {
-            if has_gaps {
+            if drive.has_gaps {
                 judge.close_in_on_changes(seen, round);
             }
             most = most.max(judge.want(seen));

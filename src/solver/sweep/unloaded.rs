@@ -10,7 +10,7 @@ use crate::position::{Position, half_lobe_rad};
 use crate::sweep::columns::{States, Sweep};
 use crate::sweep::plain_look::PlainLook;
 use crate::sweep::points::Tolerance;
-use crate::sweep::search::{LOADS, Look, Piece, Seen, TOTALS, search};
+use crate::sweep::search::{LOADS, Piece, SearchedDrive, Seen, TOTALS, search};
 use crate::{SolveError, Stop};
 
 /// Excluded length of a lap at either end of a piece, in units of the tolerance, and its minimum.
@@ -84,7 +84,7 @@ fn by_input_angle(states: &States) -> impl Iterator<Item = Range<usize>> {
 /// # Errors
 /// As [`search()`].
 pub(crate) fn extremes(
-    teeth: PlainLook<'_>,
+    plain: &PlainLook<'_>,
     pieces: impl Iterator<Item = Piece>,
     tolerance: Tolerance,
     stop: &dyn Stop,
@@ -98,15 +98,35 @@ pub(crate) fn extremes(
         ..piece
     };
     let pieces: Vec<_> = pieces.map(within).filter(|piece| piece.start < piece.end).collect();
-    let mut look = UnloadedLook { teeth, scale_rad: 1.0 };
     let Some(first) = pieces.first() else { return Ok(Vec::new()) };
-    let closing_rad = look.closing_rad(first, first.start.midpoint(first.end))?;
-    let first_rad = closing_rad.into_iter().fold(f64::INFINITY, f64::min);
-    if first_rad > 0.0 {
-        look.scale_rad = first_rad;
-    }
+    let scale_rad = first_of(&closings_rad(plain, first, first.start.midpoint(first.end))?);
+    let scale_rad = if scale_rad > 0.0 { scale_rad } else { 1.0 };
+    let look = |fractions: &[f64], seen: &mut Seen| {
+        let (piece, count) = (seen.piece, seen.teeth);
+        for &fraction in fractions {
+            let closings_rad = closings_rad(plain, &piece, fraction)?;
+            let first_rad = first_of(&closings_rad);
+            if first_rad == f64::INFINITY {
+                return Err(plain.loaded().carries_nothing(&plain.teeth(&piece, fraction)?));
+            }
+            let values = seen.push(fraction);
+            for (tooth, closing_rad) in closings_rad.into_iter().enumerate() {
+                values[EARLINESS * count + tooth] = scale_rad / (scale_rad + closing_rad);
+            }
+            values[LOADS * count + (FIRST - LOADS)] = first_rad;
+        }
+        Ok(true)
+    };
+    // The curves do not depend on the set of carrying teeth, and none ends like a power.
+    let drive = SearchedDrive {
+        has_gaps: false,
+        is_linear: true,
+        is_in_proportion: false,
+        distance_at_corner_rad: 0.0,
+        ..plain.searched()?
+    };
     // This method covers every moment.
-    let found = search(&mut look, pieces.into_iter(), tolerance, None, stop)?.unwrap_or_default();
+    let found = search(&drive, pieces.into_iter(), tolerance, None, stop, look)?.unwrap_or_default();
     let sought = [EARLINESS, FIRST].map(|quantity| found.best[quantity]).into_iter();
     // If no gap is open, there is no largest value.
     let sought = sought.filter(|best| best.value > 0.0);
@@ -121,60 +141,15 @@ const EARLINESS: usize = 0;
 /// capacity, which has kinks too.
 const FIRST: usize = LOADS + TOTALS - 1;
 
-/// Moments of the unloaded teeth.
-struct UnloadedLook<'a> {
-    teeth: PlainLook<'a>,
-    /// Reference closing angle.
-    scale_rad: f64,
+/// Returns the closing angles of a piece, place by place.
+fn closings_rad(plain: &PlainLook<'_>, piece: &Piece, fraction: f64) -> Result<Vec<f64>, SolveError> {
+    let lost_motion_rad = plain.loaded().lost_motion_rad();
+    let teeth = plain.teeth(piece, fraction)?;
+    // A gap that is taken up by lost motion may be closed up to rounding.
+    Ok(teeth.iter().map(|tooth| (lost_motion_rad + tooth.spring.closing_rad).max(0.0)).collect())
 }
 
-impl UnloadedLook<'_> {
-    /// Returns the closing angles of a piece, place by place.
-    fn closing_rad(&self, piece: &Piece, fraction: f64) -> Result<Vec<f64>, SolveError> {
-        let lost_motion_rad = self.teeth.loaded().lost_motion_rad();
-        let teeth = self.teeth.teeth(piece, fraction)?;
-        // A gap that is taken up by lost motion may be closed up to rounding.
-        Ok(teeth.iter().map(|tooth| (lost_motion_rad + tooth.spring.closing_rad).max(0.0)).collect())
-    }
-}
-
-impl Look for UnloadedLook<'_> {
-    fn has_gaps(&self) -> bool {
-        // The curves do not depend on the set of carrying teeth.
-        false
-    }
-
-    fn is_linear(&self) -> bool {
-        // No curve ends like a power.
-        true
-    }
-
-    fn is_in_proportion(&self) -> bool {
-        false
-    }
-
-    fn input_torque_nmm(&self) -> f64 {
-        self.teeth.input_torque_nmm()
-    }
-
-    fn teeth_at_each_place(&self) -> u64 {
-        self.teeth.teeth_at_each_place()
-    }
-
-    fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
-        let (piece, count) = (seen.piece, seen.teeth);
-        for &fraction in fractions {
-            let closing_rad = self.closing_rad(&piece, fraction)?;
-            let first_rad = closing_rad.iter().copied().fold(f64::INFINITY, f64::min);
-            if first_rad == f64::INFINITY {
-                return Err(self.teeth.loaded().carries_nothing(&self.teeth.teeth(&piece, fraction)?));
-            }
-            let values = seen.push(fraction);
-            for (tooth, closing_rad) in closing_rad.into_iter().enumerate() {
-                values[EARLINESS * count + tooth] = self.scale_rad / (self.scale_rad + closing_rad);
-            }
-            values[LOADS * count + (FIRST - LOADS)] = first_rad;
-        }
-        Ok(true)
-    }
+/// Returns the least of the closing angles.
+fn first_of(closings_rad: &[f64]) -> f64 {
+    closings_rad.iter().copied().fold(f64::INFINITY, f64::min)
 }

@@ -11,72 +11,12 @@ use point::EllipticContact;
 
 use crate::approach::{Approach, Corner, Logarithmic};
 use crate::contact::{Contact, HertzLine, Materials, PerContact};
-use crate::contact_law::{ContactLaw, LogarithmicTerm, PALMGREN_EXPONENT, Term, ToothSize, Touch};
+use crate::contact_law::{ContactLaw, Term, ToothSize, Touch};
 use crate::drive::{Drive, ToothShape};
 use crate::parts::CarrierRadii;
 use crate::root::NotConverged;
 
 pub use pressure::{CornerContact, Pressure};
-
-/// Shape of a tooth, as its contacts need it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ToothContact {
-    /// A cylinder: line contacts at all three contacts.
-    Cylinder,
-    /// A ball: elliptic contacts at all three contacts.
-    Ball {
-        /// Groove radius across the plane of motion, larger than the ball's. A contact without a groove is straight
-        /// along the axis.
-        groove_radius_mm: PerContact<Option<f64>>,
-    },
-    /// A cylinder with two flats on the walls of the slot: lines at wave generator and ring, a rectangle at the
-    /// carrier.
-    FlatSided {
-        /// Length of the flat along the slot.
-        flat_length_mm: f64,
-        /// Inner radius of the carrier, where its slots begin.
-        carrier_inner_radius_mm: f64,
-        /// Outer radius of the carrier, where its slots end.
-        carrier_outer_radius_mm: f64,
-    },
-}
-
-impl ToothContact {
-    /// Returns the shape of a drive's teeth. The carrier radii are used for flats only.
-    pub fn of(drive: &Drive, carrier: CarrierRadii) -> Self {
-        match drive.parameters().tooth {
-            ToothShape::Cylinder { .. } => Self::Cylinder,
-            ToothShape::Ball { groove_radius_mm } => Self::Ball { groove_radius_mm },
-            ToothShape::FlatSided { flat_length_mm, .. } => {
-                let [carrier_inner_radius_mm, carrier_outer_radius_mm] = carrier.of(drive);
-                Self::FlatSided { flat_length_mm, carrier_inner_radius_mm, carrier_outer_radius_mm }
-            }
-        }
-    }
-
-    const fn touch(&self, contact: Contact) -> Touch {
-        match (self, contact) {
-            (Self::Ball { .. }, _) => Touch::Ellipse,
-            (Self::FlatSided { .. }, Contact::Carrier) => Touch::Flat,
-            (Self::Cylinder | Self::FlatSided { .. }, _) => Touch::Line,
-        }
-    }
-}
-
-/// Law of the three contacts of a tooth, for column-wise evaluation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum ToothLaw {
-    /// `δ = F/k`, including the series compliance.
-    Linear { compliance_mm_per_n: PerContact<f64> },
-    /// Palmgren's `δ = q F^0.9`, the same at all three contacts.
-    Palmgren { coefficient: f64 },
-    /// Palmgren's law at wave generator, ring and (unless a flat is there) carrier, plus a linear compliance.
-    PalmgrenAndLinear { coefficient: PerContact<f64>, compliance_mm_per_n: PerContact<f64> },
-    /// `δ = F (A + B ln(F_r/F))`, plus the series compliance.
-    Logarithmic { law: PerContact<LogarithmicTerm>, series_compliance_mm_per_n: PerContact<f64> },
-    /// Hertz's ellipses.
-    Hertz,
-}
 
 /// Powers of the stresses to which forces are proportional.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -172,13 +112,15 @@ impl Flat {
 /// The three contacts of the teeth of a drive under a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Contacts {
-    shape: ToothContact,
+    shape: ToothShape,
     tooth_radius_mm: f64,
     tooth_width_mm: f64,
+    /// Inner and outer radius of the carrier, where its slots begin and end.
+    carrier_radii_mm: [f64; 2],
     modulus_mpa: PerContact<f64>,
     hertz: PerContact<HertzLine>,
-    law: PerContact<Term>,
-    series_compliance_mm_per_n: PerContact<f64>,
+    pub(crate) law: PerContact<Term>,
+    pub(crate) series_compliance_mm_per_n: PerContact<f64>,
 }
 
 /// Returns the approach at the wave generator under a force, by a law of cylinders that does not depend on the place.
@@ -210,22 +152,30 @@ pub(crate) struct Place {
 impl Contacts {
     /// Builds the contacts; none if the law does not apply to the shape.
     pub(crate) fn new(
-        shape: &ToothContact,
+        drive: &Drive,
+        carrier: CarrierRadii,
         law: &ContactLaw,
         materials: &Materials,
-        size: ToothSize,
         series_compliance_mm_per_n: &PerContact<f64>,
     ) -> Option<Self> {
-        let law = |contact| law.term(shape.touch(contact), contact, materials, size);
+        let shape = drive.parameters().tooth;
+        let size = ToothSize { radius_mm: drive.parameters().tooth_radius_mm, width_mm: drive.tooth_width_mm() };
+        let touch = |contact| match (shape, contact) {
+            (ToothShape::Ball { .. }, _) => Touch::Ellipse,
+            (ToothShape::FlatSided { .. }, Contact::Carrier) => Touch::Flat,
+            (ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. }, _) => Touch::Line,
+        };
+        let law = |contact| law.term(touch(contact), contact, materials, size);
         let laws = PerContact {
             wave_generator: law(Contact::WaveGenerator)?,
             ring: law(Contact::Ring)?,
             carrier: law(Contact::Carrier)?,
         };
         Some(Self {
-            shape: *shape,
+            shape,
             tooth_radius_mm: size.radius_mm,
             tooth_width_mm: size.width_mm,
+            carrier_radii_mm: carrier.of(drive),
             modulus_mpa: PerContact::of(|contact| materials.contact_modulus_mpa(contact)),
             hertz: PerContact::of(|contact| HertzLine::new(materials, contact, size.width_mm)),
             law: laws,
@@ -238,68 +188,14 @@ impl Contacts {
         self.hertz.get(contact)
     }
 
-    /// Returns the law for column-wise evaluation; none if it has no columns. A flat with its own law contributes only
-    /// its series compliance.
-    pub(crate) fn tooth_law(&self) -> Option<ToothLaw> {
-        let series = &self.series_compliance_mm_per_n;
-        let is_alone = series.iter().all(|(_, &compliance)| compliance == 0.0);
-        let PerContact { wave_generator, ring, carrier } = &self.law;
-        // Other powers have no columns.
-        if matches!(wave_generator, Term::Power { exponent, .. } if exponent.total_cmp(&PALMGREN_EXPONENT).is_ne()) {
-            return None;
-        }
-        match (wave_generator, ring, carrier) {
-            _ if matches!(self.shape, ToothContact::Ball { .. }) => {
-                (is_alone && *wave_generator == Term::Ellipse).then_some(ToothLaw::Hertz)
-            }
-            (
-                Term::Linear { compliance_mm_per_n: wave_generator },
-                Term::Linear { compliance_mm_per_n: ring },
-                carrier @ (Term::Linear { .. } | Term::Flat),
-            ) => {
-                let carrier =
-                    if let Term::Linear { compliance_mm_per_n } = carrier { *compliance_mm_per_n } else { 0.0 };
-                Some(ToothLaw::Linear {
-                    compliance_mm_per_n: PerContact {
-                        wave_generator: wave_generator + series.wave_generator,
-                        ring: ring + series.ring,
-                        carrier: carrier + series.carrier,
-                    },
-                })
-            }
-            (&Term::Power { coefficient, .. }, ring, carrier)
-                if is_alone && wave_generator == ring && ring == carrier =>
-            {
-                Some(ToothLaw::Palmgren { coefficient })
-            }
-            (
-                &Term::Power { coefficient: wave_generator, .. },
-                &Term::Power { coefficient: ring, .. },
-                carrier @ (Term::Power { .. } | Term::Flat),
-            ) => {
-                let carrier = if let Term::Power { coefficient, .. } = *carrier { coefficient } else { 0.0 };
-                Some(ToothLaw::PalmgrenAndLinear {
-                    coefficient: PerContact { wave_generator, ring, carrier },
-                    compliance_mm_per_n: *series,
-                })
-            }
-            (
-                &Term::Logarithmic(wave_generator),
-                &Term::Logarithmic(ring),
-                carrier @ (Term::Logarithmic(_) | Term::Flat),
-            ) => {
-                let carrier = if let Term::Logarithmic(line) = carrier { *line } else { LogarithmicTerm::NONE };
-                Some(ToothLaw::Logarithmic {
-                    law: PerContact { wave_generator, ring, carrier },
-                    series_compliance_mm_per_n: *series,
-                })
-            }
-            _ => None,
-        }
+    /// Returns true if the approach at each contact is proportional to its force, the same at every place.
+    pub(crate) fn are_linear(&self) -> bool {
+        self.law.iter().all(|(_, law)| matches!(law, Term::Linear { .. }))
+            && matches!(self.shape, ToothShape::Cylinder { .. })
     }
 
     pub(crate) fn ball(&self, contact: Contact) -> Option<BallContact> {
-        let ToothContact::Ball { groove_radius_mm } = &self.shape else { return None };
+        let ToothShape::Ball { groove_radius_mm } = &self.shape else { return None };
         let r = self.tooth_radius_mm;
         // 1/r - 1/r_g without a difference of nearly equal numbers.
         let axial_per_mm = groove_radius_mm.get(contact).map_or(1.0 / r, |groove| (groove - r) / groove / r);
@@ -308,10 +204,8 @@ impl Contacts {
 
     /// Returns the flat of flat-sided teeth.
     pub(crate) fn flat(&self) -> Option<Flat> {
-        let ToothContact::FlatSided { flat_length_mm, carrier_inner_radius_mm, carrier_outer_radius_mm } = self.shape
-        else {
-            return None;
-        };
+        let ToothShape::FlatSided { flat_length_mm, .. } = self.shape else { return None };
+        let [carrier_inner_radius_mm, carrier_outer_radius_mm] = self.carrier_radii_mm;
         Some(Flat {
             length_mm: flat_length_mm,
             width_mm: self.tooth_width_mm,

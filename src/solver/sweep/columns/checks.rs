@@ -1,7 +1,7 @@
 //! Checks that a sweep has to pass: torque balance, and closure of the period.
 
-use super::peaks::{ContactPeaks, TorqueCapacity};
-use super::states::{Columns, InputAngles, States, Sweep};
+use super::peaks::ContactPeaks;
+use super::states::{InputAngles, States, Sweep};
 use crate::SolveError;
 use crate::contact::PerContact;
 use crate::drive::Drive;
@@ -49,21 +49,10 @@ pub(crate) fn worse(residual: f64, before: f64) -> f64 {
     if residual.is_nan() || residual > before { residual } else { before }
 }
 
-/// Returns a sweep with its peaks and closure, or an error if a check fails.
-pub(crate) fn finished(
-    loaded: &LoadedDrive<'_>,
-    points: Points,
-    columns: Columns,
-    torque_capacity: Option<TorqueCapacity>,
-) -> Result<Sweep, SolveError> {
-    let Columns { states, input_angles, peaks, torque_balance_residual } = columns;
-    let tooth_width_mm = loaded.drive().tooth_width_mm();
-    let peaks = PerContact::of(|contact| {
-        let (force, at) = (states.force_n.get(contact), peaks.get(contact));
-        let stress_mpa = states.peak(states.stress_mpa.get(contact), at.stress);
-        ContactPeaks::of_line(states.peak(force, at.force), stress_mpa, force[at.stress], tooth_width_mm)
-    });
-    let mut period_closure_residual = period_closure(loaded, points, &states, &peaks)?;
+/// Returns a sweep with its closure, or an error if a check fails.
+pub(crate) fn checked(sweep: Sweep, loaded: &LoadedDrive<'_>, points: Points) -> Result<Sweep, SolveError> {
+    let Sweep { input_angles, torque_balance_residual, .. } = &sweep;
+    let mut period_closure_residual = period_closure(loaded, points, &sweep.states, &sweep.peaks)?;
     if loaded.mesh().tells_items_apart() {
         // The wind-up shows whether all items are back in their positions.
         let wind_up_deg = &input_angles.wind_up_deg;
@@ -71,7 +60,7 @@ pub(crate) fn finished(
         let [first_deg, last_deg] = ends_deg;
         period_closure_residual = worse((last_deg - first_deg).abs() / last_deg, period_closure_residual);
     }
-    check("torque balance", torque_balance_residual)?;
+    check("torque balance", *torque_balance_residual)?;
     // Light loads across wide gaps, or at corners, keep fewer digits. The residual in the answer shows how many.
     if let Err(inconsistent) = check("period closure", period_closure_residual) {
         let of_rounding = ROUNDINGS * f64::EPSILON * input_angles.amplification(loaded)?;
@@ -79,8 +68,7 @@ pub(crate) fn finished(
             return Err(inconsistent);
         }
     }
-    let mesh = *loaded.mesh();
-    Ok(Sweep { mesh, states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual })
+    Ok(Sweep { period_closure_residual, ..sweep })
 }
 
 /// Number of rounding errors of closing angles by which two paths to the same loads may differ.

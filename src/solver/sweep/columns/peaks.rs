@@ -94,6 +94,28 @@ impl ContactPeaks {
     }
 }
 
+/// Peaks of force and stress at a contact over the states so far.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PeaksSoFar {
+    pub(crate) force_n: Peak,
+    pub(crate) stress_mpa: Peak,
+    /// Force in the state of the stress peak.
+    pub(crate) force_at_stress_n: f64,
+}
+
+impl PeaksSoFar {
+    /// Peaks of no state.
+    pub(crate) const NONE: Self = {
+        let none = Peak { value: f64::NEG_INFINITY, input_angle_deg: 0.0, position_deg: 0.0 };
+        Self { force_n: none, stress_mpa: none, force_at_stress_n: 0.0 }
+    };
+
+    /// Returns the peaks of a line contact.
+    pub(crate) fn of_line(&self, tooth_width_mm: f64) -> ContactPeaks {
+        ContactPeaks::of_line(self.force_n, self.stress_mpa, self.force_at_stress_n, tooth_width_mm)
+    }
+}
+
 /// Torque capacity and the contact that limits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]

@@ -4,7 +4,6 @@ use super::peaks::{ContactPeaks, Extremes, Peak, SweepPeaks, TorqueCapacity};
 use crate::contact::PerContact;
 use crate::drive::Drive;
 use crate::mesh::{Mesh, TeethInMesh};
-use crate::springs::WindUp;
 
 /// States of a sweep, by input angle and then tooth number: columns of equal length with one entry for each state. If
 /// the zones are alike, the teeth of one zone represent all. Otherwise the teeth of all zones are listed ([`Mesh`]).
@@ -95,12 +94,12 @@ impl From<&Sweep> for SweepPeaks {
 }
 
 impl States {
-    pub(crate) fn with_capacity(count: usize) -> Self {
+    pub(crate) fn with_capacity(count: usize, lists_lobes: bool) -> Self {
         let column = || Vec::with_capacity(count);
         Self {
             input_angle_deg: column(),
             tooth: Vec::with_capacity(count),
-            lobe: Vec::new(),
+            lobe: Vec::with_capacity(if lists_lobes { count } else { 0 }),
             position_deg: column(),
             center_radius_mm: column(),
             wave_generator_angle_deg: column(),
@@ -141,21 +140,6 @@ impl States {
     }
 }
 
-/// Indices of the states with the peaks of a contact's force and stress.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct PeakAt {
-    pub(crate) force: usize,
-    pub(crate) stress: usize,
-}
-
-/// Result of both the plain and the fast path.
-pub(crate) struct Columns {
-    pub(crate) states: States,
-    pub(crate) input_angles: InputAngles,
-    pub(crate) peaks: PerContact<PeakAt>,
-    pub(crate) torque_balance_residual: f64,
-}
-
 impl InputAngles {
     pub(crate) fn with_capacity(count: usize) -> Self {
         let column = || Vec::with_capacity(count);
@@ -185,10 +169,18 @@ impl InputAngles {
         1e-3 * stiffness_nmm_per_rad * torque_ratio * torque_ratio
     }
 
-    /// Appends an input angle. The stiffness `dM0/dΔφ` is converted to that at the output.
-    pub(crate) fn push(&mut self, drive: &Drive, input_angle_deg: f64, wind_up: &WindUp, loaded_teeth: usize) {
-        let stiffness = std::iter::once(wind_up.stiffness_nmm_per_rad);
-        self.extend(drive, &[input_angle_deg], &[wind_up.rotation_rad()], stiffness, std::iter::once(loaded_teeth));
+    /// Appends an input angle.
+    pub(crate) fn push(
+        &mut self,
+        input_angle_deg: f64,
+        wind_up_deg: f64,
+        torsional_stiffness_nm_per_rad: f64,
+        loaded_teeth: u32,
+    ) {
+        self.input_angle_deg.push(input_angle_deg);
+        self.wind_up_deg.push(wind_up_deg);
+        self.torsional_stiffness_nm_per_rad.push(torsional_stiffness_nm_per_rad);
+        self.loaded_teeth.push(loaded_teeth);
     }
 
     /// Appends several input angles.

@@ -35,28 +35,19 @@ pub(super) struct GapWork<'a> {
     ring_cos: &'a mut [f64],
     ring_sin: &'a mut [f64],
     /// Deviations at the teeth of a lap, by their order in a row.
-    items: [&'a mut [f64]; Item::COUNT],
+    items: [&'a mut [f64]; GapWork::ITEMS],
 }
 
-/// Deviations of the items at a tooth.
-struct Item {
-    /// Gaps; those of a runout in units of the direction's cosine and sine.
-    cam: [f64; 3],
-    ring: [f64; 3],
-    carrier: f64,
-    /// Rotation about the axis, as lost motion.
-    lost_motion_rad: f64,
-}
-
-impl Item {
-    const COUNT: usize = 8;
-}
+/// Deviations at a tooth, or the part of them that one item has. Three gaps at the wave generator: constant, and in units
+/// of the direction's cosine and sine; three at the ring; one at the carrier. Then the rotation about the axis, as lost
+/// motion.
+type Item = [f64; GapWork::ITEMS];
 
 impl<'a> GapWork<'a> {
     /// Number of columns of states.
     pub(super) const COLUMNS: usize = 7;
     /// Number of columns of the teeth at an input angle.
-    pub(super) const ITEMS: usize = Item::COUNT;
+    pub(super) const ITEMS: usize = 8;
 
     /// Builds the columns from slices of any length.
     pub(super) fn new(slice: &mut impl FnMut(usize) -> &'a mut [f64], column: usize, teeth: usize) -> Self {
@@ -98,27 +89,9 @@ struct Relief {
 
 /// Deviations of individual items.
 struct Deviating {
-    slots: Vec<Slot>,
-    spaces: Vec<Space>,
-    lobes: Vec<Lobe>,
-}
-
-#[derive(Clone, Copy)]
-struct Slot {
-    thinner_mm: f64,
-    carrier_mm: f64,
-    lost_motion_rad: f64,
-}
-
-#[derive(Clone, Copy)]
-struct Space {
-    ring_mm: [f64; 3],
-    lost_motion_rad: f64,
-}
-
-#[derive(Clone, Copy)]
-struct Lobe {
-    cam_mm: [f64; 3],
+    slots: Vec<Item>,
+    spaces: Vec<Item>,
+    lobes: Vec<Item>,
 }
 
 impl Deviating {
@@ -133,36 +106,24 @@ impl Deviating {
         let slot = |slot| {
             let thinner_mm = MM_PER_UM * of(&deviations.tooth_radius_um, slot);
             let direction_rad = direction_rad(slot, slots, runout.carrier.angle_deg) + s * 0.5 * PI;
-            Slot {
-                thinner_mm,
-                carrier_mm: MM_PER_UM * of(&deviations.slot_wall_um, slot)
-                    + amount_mm.carrier * direction_rad.cos()
-                    + thinner_mm,
-                lost_motion_rad: drive.teeth_per_wave() * RAD_PER_ARCSEC * of(&deviations.slot_angle_arcsec, slot),
-            }
+            let carrier_mm =
+                MM_PER_UM * of(&deviations.slot_wall_um, slot) + amount_mm.carrier * direction_rad.cos() + thinner_mm;
+            let lost_motion_rad = drive.teeth_per_wave() * RAD_PER_ARCSEC * of(&deviations.slot_angle_arcsec, slot);
+            [thinner_mm, 0.0, 0.0, thinner_mm, 0.0, 0.0, carrier_mm, lost_motion_rad]
         };
         let space = |space| {
             let (sin, cos) = direction_rad(space, spaces, runout.ring.angle_deg).sin_cos();
-            Space {
-                ring_mm: [
-                    MM_PER_UM * of(&deviations.ring_space_um, space),
-                    amount_mm.ring * cos,
-                    s * amount_mm.ring * sin,
-                ],
-                lost_motion_rad: drive.flank().teeth_per_wave()
-                    * RAD_PER_ARCSEC
-                    * of(&deviations.ring_space_angle_arcsec, space),
-            }
+            let ring_mm = MM_PER_UM * of(&deviations.ring_space_um, space);
+            let (by_cos_mm, by_sin_mm) = (amount_mm.ring * cos, s * amount_mm.ring * sin);
+            let k = drive.flank().teeth_per_wave();
+            let lost_motion_rad = k * RAD_PER_ARCSEC * of(&deviations.ring_space_angle_arcsec, space);
+            [0.0, 0.0, 0.0, ring_mm, by_cos_mm, by_sin_mm, 0.0, lost_motion_rad]
         };
         let lobe = |lobe| {
             let (sin, cos) = direction_rad(lobe, lobes, runout.wave_generator.angle_deg).sin_cos();
-            Lobe {
-                cam_mm: [
-                    MM_PER_UM * of(&deviations.wave_generator_lobe_um, lobe),
-                    -amount_mm.wave_generator * cos,
-                    amount_mm.wave_generator * sin,
-                ],
-            }
+            let cam_mm = MM_PER_UM * of(&deviations.wave_generator_lobe_um, lobe);
+            let (by_cos_mm, by_sin_mm) = (-amount_mm.wave_generator * cos, amount_mm.wave_generator * sin);
+            [cam_mm, by_cos_mm, by_sin_mm, 0.0, 0.0, 0.0, 0.0, 0.0]
         };
         Self {
             slots: (0..slots).map(slot).collect(),
@@ -172,26 +133,17 @@ impl Deviating {
     }
 
     fn item(&self, &Place { slot, ring_space, lobe }: &Place) -> Item {
-        let (slot, space) = (self.slots[whole(slot)], self.spaces[whole(ring_space)]);
-        let Lobe { cam_mm: [cam, cam_cos, cam_sin] } = self.lobes[whole(lobe)];
-        let [ring, ring_cos, ring_sin] = space.ring_mm;
-        Item {
-            cam: [cam + slot.thinner_mm, cam_cos, cam_sin],
-            ring: [ring + slot.thinner_mm, ring_cos, ring_sin],
-            carrier: slot.carrier_mm,
-            lost_motion_rad: slot.lost_motion_rad + space.lost_motion_rad,
-        }
+        let (slot, space) = (&self.slots[whole(slot)], &self.spaces[whole(ring_space)]);
+        let lobe = &self.lobes[whole(lobe)];
+        std::array::from_fn(|i| slot[i] + space[i] + lobe[i])
     }
 
-    /// Returns the largest total at a tooth, in mm, with rotations at this arm.
+    /// Returns an upper bound of the total at a tooth, in mm, with rotations at this arm.
     fn most_mm(&self, arm_mm: f64) -> f64 {
-        let sum = |parts: &[f64; 3]| parts.iter().map(|part| part.abs()).sum::<f64>();
-        let slots = self.slots.iter().map(|&Slot { thinner_mm, carrier_mm, lost_motion_rad }| {
-            thinner_mm.abs() + carrier_mm.abs() + lost_motion_rad.abs() * arm_mm
-        });
-        let spaces = self.spaces.iter().map(|space| sum(&space.ring_mm) + space.lost_motion_rad.abs() * arm_mm);
-        let lobes = self.lobes.iter().map(|lobe| sum(&lobe.cam_mm));
-        slots.fold(0.0, f64::max) + spaces.fold(0.0, f64::max) + lobes.fold(0.0, f64::max)
+        let total = |[gaps_mm @ .., lost_motion_rad]: &Item| {
+            gaps_mm.iter().map(|gap_mm| gap_mm.abs()).sum::<f64>() + lost_motion_rad.abs() * arm_mm
+        };
+        [&self.slots, &self.spaces, &self.lobes].map(|items| items.iter().map(total).fold(0.0, f64::max)).iter().sum()
     }
 }
 
@@ -247,11 +199,8 @@ impl GapColumns {
         let Some(deviating) = &unlike.deviating else { return };
         for listed in &teeth.listed {
             for tooth in 0..listed.count() {
-                let Item { cam, ring, carrier, lost_motion_rad } = deviating.item(&listed.place(mesh, tooth));
-                let [cam, cam_cos, cam_sin] = cam;
-                let [ring, ring_cos, ring_sin] = ring;
-                let values = [cam, cam_cos, cam_sin, ring, ring_cos, ring_sin, carrier, lost_motion_rad];
-                gaps.items.iter_mut().zip(values).for_each(|(column, value)| column[listed.at + tooth] = value);
+                let item = deviating.item(&listed.place(mesh, tooth));
+                gaps.items.iter_mut().zip(item).for_each(|(column, value)| column[listed.at + tooth] = value);
             }
         }
     }

@@ -13,7 +13,7 @@ use crate::contact::Contact;
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::Mesh;
 use crate::sweep::columns::{AngleExtremes, TorqueBalance, TorqueCapacity};
-use crate::sweep::search::{LOADS, Look, Piece, Seen};
+use crate::sweep::search::{LOADS, Piece, SearchedDrive, Seen};
 use crate::{SolveError, Stop};
 
 /// Evaluates moments with the kernel.
@@ -176,36 +176,25 @@ impl<'a> FastLook<'a> {
         }
         true
     }
-}
 
-impl Look for FastLook<'_> {
-    fn has_gaps(&self) -> bool {
-        matches!(&self.kernel.law, Law::Sharing(sharing) if sharing.has_gaps())
-    }
-
-    fn is_linear(&self) -> bool {
-        match &self.kernel.law {
-            Law::Linear(_) => true,
-            Law::Sharing(sharing) => sharing.is_linear(),
+    /// Returns what the search needs to know. The kernel has no corners.
+    pub(super) fn searched(&self) -> SearchedDrive {
+        let (has_gaps, is_linear) = match &self.kernel.law {
+            Law::Linear(_) => (false, true),
+            Law::Sharing(sharing) => (sharing.has_gaps(), sharing.is_linear()),
+        };
+        SearchedDrive {
+            has_gaps,
+            is_linear,
+            is_in_proportion: self.kernel.law.is_in_proportion(),
+            input_torque_nmm: self.loaded.input_torque_nmm(),
+            distance_at_corner_rad: 0.0,
+            teeth_at_each_place: self.layout.at_each_place as u64,
         }
     }
 
-    fn is_in_proportion(&self) -> bool {
-        match &self.kernel.law {
-            Law::Linear(_) => true,
-            Law::Sharing(sharing) => sharing.is_in_proportion(),
-        }
-    }
-
-    fn input_torque_nmm(&self) -> f64 {
-        self.loaded.input_torque_nmm()
-    }
-
-    fn teeth_at_each_place(&self) -> u64 {
-        self.layout.at_each_place as u64
-    }
-
-    fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
+    /// Appends moments of a piece. Returns false if the plain path is needed.
+    pub(super) fn look(&mut self, fractions: &[f64], seen: &mut Seen) -> Result<bool, SolveError> {
         // Positions repeat in every lap.
         let piece = Piece { lap: 0, ..seen.piece };
         let bases = self.bases.iter().position(|bases| bases.piece == piece).unwrap_or_else(|| {

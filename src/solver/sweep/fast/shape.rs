@@ -59,24 +59,33 @@ pub(super) struct EllipseShape {
     pub(super) b: f64,
     pub(super) r: f64,
     pub(super) difference_of_squares: f64,
-    guess: Guess,
+    /// Terms of the initial value of h: its series in ε = (a - b)/(a + b) up to the third power.
+    guess: [f64; 4],
 }
 
 impl EllipseShape {
     pub(super) fn new(cam: &Ellipse, r: f64) -> Self {
         let (a, b) = (cam.semi_major_mm(), cam.semi_minor_mm());
-        Self { a, b, r, difference_of_squares: cam.difference_of_squares_mm2(), guess: Guess::new(a, b, r) }
+        let mean = 0.5 * (a + b);
+        let (flattening, thickness) = ((a - b) / (a + b), r / mean);
+        let round = 1.0 + thickness;
+        let first = mean * flattening;
+        let second = 2.0 * first * flattening * (thickness - 7.0) / round;
+        let third = 2.0 * first * flattening * flattening * (thickness * (thickness - 14.0) + 25.0) / (round * round);
+        let guess = [mean, first, second, third];
+        Self { a, b, r, difference_of_squares: cam.difference_of_squares_mm2(), guess }
     }
 
     /// Returns the support h: the root in [b, a] of sin² (a² + rh)² (h² - b²) - cos² (b² + rh)² (a² - h²), by Halley's
     /// method. Its one division replaces two of Newton's steps. Returns none if it converges too slowly.
     #[inline(always)]
     pub(super) fn supports(&self, sin: &[f64; LANES], cos: &[f64; LANES]) -> Option<[f64; LANES]> {
-        let Self { a, b, r, .. } = *self;
+        let Self { a, b, r, guess: [mean, first, second, third], .. } = *self;
         let (a2, b2) = (a * a, b * b);
         let mut support = [0.0; LANES];
         for i in 0..LANES {
-            let guess = self.guess.at(sin[i], cos[i]);
+            let (double_cos, product) = (cos[i] * cos[i] - sin[i] * sin[i], sin[i] * cos[i]);
+            let guess = mean + first * double_cos + product * product * (second - third * double_cos);
             support[i] = if guess > b { guess } else { b };
         }
         for _ in 0..MAX_STEPS {
@@ -103,32 +112,5 @@ impl EllipseShape {
             }
         }
         None
-    }
-}
-
-/// Initial value of the support: the series of h in ε = (a - b)/(a + b) up to its third power.
-#[derive(Clone, Copy)]
-struct Guess {
-    mean: f64,
-    first: f64,
-    second: f64,
-    third: f64,
-}
-
-impl Guess {
-    pub(super) fn new(a: f64, b: f64, r: f64) -> Self {
-        let mean = 0.5 * (a + b);
-        let (flattening, thickness) = ((a - b) / (a + b), r / mean);
-        let round = 1.0 + thickness;
-        let first = mean * flattening;
-        let second = 2.0 * first * flattening * (thickness - 7.0) / round;
-        let third = 2.0 * first * flattening * flattening * (thickness * (thickness - 14.0) + 25.0) / (round * round);
-        Self { mean, first, second, third }
-    }
-
-    #[inline(always)]
-    pub(super) fn at(&self, sin: f64, cos: f64) -> f64 {
-        let (double_cos, product) = (cos * cos - sin * sin, sin * cos);
-        self.mean + self.first * double_cos + product * product * (self.second - self.third * double_cos)
     }
 }

@@ -12,9 +12,9 @@ use pulp::Simd;
 
 use super::lanes::repeat_each;
 use crate::contact::{Contact, PerContact};
-use crate::contact_law::{LogarithmicTerm, WIDEST_SHARE};
+use crate::contact_law::{LogarithmicTerm, PALMGREN_EXPONENT, Term, WIDEST_SHARE};
 use crate::load_sharing::{Compatibility, LoadedDrive};
-use crate::tooth::{StressExponents, ToothLaw};
+use crate::tooth::StressExponents;
 
 pub(crate) use power_law::{Hertz, Linear, Palmgren, Power, PowerLaw};
 pub(crate) use two_parts::{Logarithm, NoPowerLaw, PalmgrenAndLinear};
@@ -32,9 +32,6 @@ const OPEN_TORQUE: f64 = 8.0 * f64::EPSILON;
 
 /// Replaces zero where a logarithm is needed. No contact has a ratio or a force this small.
 const NOTHING: f64 = 1e-150;
-
-/// Substitute for the force limit of a flat, to which the limit of Johnson's law does not apply.
-const NEVER_TOO_WIDE_N: f64 = 1e100;
 
 /// Teeth of a tile under 1 N at the wave generator, by input angle and then tooth.
 pub(super) struct Teeth<'a> {
@@ -338,44 +335,55 @@ pub(super) enum Sharing {
 }
 
 impl Sharing {
-    /// Returns the method of a drive under a load; none if its law has no columns.
+    /// Returns the method of a drive under a load; none if its law has no columns. A flat with its own law contributes
+    /// only its series compliance.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
-        let weights = Weights::new(loaded);
-        let has_gaps = !loaded.gaps().is_nil();
-        Some(match loaded.tooth_law()? {
-            ToothLaw::Linear { compliance_mm_per_n } => {
-                Self::Linear(PowerLaw { power: Linear { compliance_mm_per_n, weights }, has_gaps })
-            }
-            ToothLaw::Palmgren { coefficient } => {
-                Self::Palmgren(PowerLaw { power: Palmgren { coefficient, weights }, has_gaps })
-            }
-            ToothLaw::PalmgrenAndLinear { coefficient, compliance_mm_per_n: compliance } => {
-                let law = PalmgrenAndLinear { coefficient, compliance, weights };
-                Self::PalmgrenAndLinear(NoPowerLaw { law, has_gaps })
-            }
-            ToothLaw::Hertz => Self::Hertz(PowerLaw { power: Hertz, has_gaps }),
-            ToothLaw::Logarithmic { law, series_compliance_mm_per_n: series } => {
-                let tooth_radius_mm = loaded.drive().parameters().tooth_radius_mm;
-                let reference = |contact| {
-                    let LogarithmicTerm { growth_mm_per_n, length_mm, .. } = *law.get(contact);
-                    let of_curvature = length_mm * length_mm / (4.0 * growth_mm_per_n);
-                    match contact {
-                        // σ² = F Σ E*/(π L1), F = 1 at the wave generator and F_K/F_H at the ring.
-                        Contact::WaveGenerator | Contact::Ring => {
-                            of_curvature / loaded.hertz(contact).modulus_per_width_mpa_per_mm()
-                        }
-                        Contact::Carrier if growth_mm_per_n > 0.0 => of_curvature / tooth_radius_mm,
-                        Contact::Carrier => NEVER_TOO_WIDE_N,
-                    }
+        let contacts = loaded.contacts_in_columns()?;
+        let (weights, has_gaps) = (Weights::new(loaded), !loaded.gaps().is_nil());
+        let series = contacts.series_compliance_mm_per_n;
+        let is_alone = series.iter().all(|(_, &compliance)| compliance == 0.0);
+        let PerContact { wave_generator, ring, carrier } = contacts.law;
+        // Other powers have no columns.
+        if matches!(wave_generator, Term::Power { exponent, .. } if exponent.total_cmp(&PALMGREN_EXPONENT).is_ne()) {
+            return None;
+        }
+        match (wave_generator, ring, carrier) {
+            _ if contacts.ball(Contact::WaveGenerator).is_some() => (is_alone && wave_generator == Term::Ellipse)
+                .then_some(Self::Hertz(PowerLaw { power: Hertz, has_gaps })),
+            (
+                Term::Linear { compliance_mm_per_n: wave_generator },
+                Term::Linear { compliance_mm_per_n: ring },
+                Term::Linear { .. } | Term::Flat,
+            ) => {
+                let carrier =
+                    if let Term::Linear { compliance_mm_per_n } = carrier { compliance_mm_per_n } else { 0.0 };
+                let compliance_mm_per_n = PerContact {
+                    wave_generator: wave_generator + series.wave_generator,
+                    ring: ring + series.ring,
+                    carrier: carrier + series.carrier,
                 };
-                let law = Logarithm {
-                    compliance: PerContact::of(|contact| law.get(contact).compliance_mm_per_n + series.get(contact)),
-                    growth: PerContact::of(|contact| law.get(contact).growth_mm_per_n),
-                    reference: PerContact::of(reference),
-                };
-                Self::Logarithmic(NoPowerLaw { law, has_gaps })
+                Some(Self::Linear(PowerLaw { power: Linear { compliance_mm_per_n, weights }, has_gaps }))
             }
-        })
+            (Term::Power { coefficient, .. }, ..) if is_alone && wave_generator == ring && ring == carrier => {
+                Some(Self::Palmgren(PowerLaw { power: Palmgren { coefficient, weights }, has_gaps }))
+            }
+            (
+                Term::Power { coefficient: wave_generator, .. },
+                Term::Power { coefficient: ring, .. },
+                Term::Power { .. } | Term::Flat,
+            ) => {
+                let carrier = if let Term::Power { coefficient, .. } = carrier { coefficient } else { 0.0 };
+                let coefficient = PerContact { wave_generator, ring, carrier };
+                let law = PalmgrenAndLinear { coefficient, compliance: series, weights };
+                Some(Self::PalmgrenAndLinear(NoPowerLaw { law, has_gaps }))
+            }
+            (Term::Logarithmic(wave_generator), Term::Logarithmic(ring), Term::Logarithmic(_) | Term::Flat) => {
+                let carrier = if let Term::Logarithmic(line) = carrier { line } else { LogarithmicTerm::NONE };
+                let law = Logarithm::new(loaded, &PerContact { wave_generator, ring, carrier }, &series);
+                Some(Self::Logarithmic(NoPowerLaw { law, has_gaps }))
+            }
+            _ => None,
+        }
     }
 
     /// Computes the place-dependent part of the law, independent of the gaps.

@@ -3,13 +3,14 @@
 use std::iter::zip;
 use std::ops::Range;
 
+use super::Filled;
 use super::lanes::{first_product, largest, largest_product, repeat_each};
 use super::laps::{LapTeeth, Laps, Listed, Stretch, whole};
 use super::tile::Tile;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
 use crate::mesh::Place;
-use crate::sweep::columns::{AngleExtremes, Columns, ContactPeaks, InputAngles, Peak, PeakAt, States, SweepPeaks};
+use crate::sweep::columns::{AngleExtremes, ContactPeaks, InputAngles, Peak, PeaksSoFar, States, Sweep, SweepPeaks};
 
 /// Receives tiles, in order.
 pub(super) trait Sink {
@@ -36,28 +37,30 @@ impl<'a> ColumnSink<'a> {
         let (states, input_angles) = if laps.are_listed() {
             (States::of_zeros(states), InputAngles::of_zeros(samples))
         } else {
-            (States::with_capacity(states), InputAngles::with_capacity(samples))
+            (States::with_capacity(states, false), InputAngles::with_capacity(samples))
         };
         Self { laps, states, input_angles, peaks: PerContact::default() }
     }
 
-    /// Returns the columns. If one zone represents all, the last input angle repeats the first, every tooth one number
-    /// higher.
-    pub(super) fn columns(self, torque_balance_residual: f64) -> Columns {
+    /// Returns the sweep, to be checked. If one zone represents all, the last input angle repeats the first, every tooth
+    /// one number higher.
+    pub(super) fn sweep(self, drive: &Drive, Filled { torque_balance_residual, torque_capacity }: Filled) -> Sweep {
         let Self { laps, mut states, mut input_angles, peaks } = self;
         let peaks = PerContact::of(|contact| {
-            let [force, stress] = peaks.get(contact);
-            PeakAt {
-                force: force.find(states.force_n.get(contact)),
-                stress: stress.find(states.stress_mpa.get(contact)),
-            }
+            let (force_n, stress_mpa) = (states.force_n.get(contact), states.stress_mpa.get(contact));
+            let [of_force, of_stress] = peaks.get(contact);
+            let (force_at, stress_at) = (of_force.find(force_n), of_stress.find(stress_mpa));
+            let (force_peak_n, stress_peak_mpa) = (states.peak(force_n, force_at), states.peak(stress_mpa, stress_at));
+            ContactPeaks::of_line(force_peak_n, stress_peak_mpa, force_n[stress_at], drive.tooth_width_mm())
         });
         if !laps.are_listed() {
             let end_deg = laps.input_angle_deg(laps.of_lap.count());
             states.repeat_first(laps.mesh().teeth_at(0, laps.of_lap).count(), end_deg);
             input_angles.repeat_first(end_deg);
         }
-        Columns { states, input_angles, peaks, torque_balance_residual }
+        let mesh = *laps.mesh();
+        let period_closure_residual = 0.0;
+        Sweep { mesh, states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual }
     }
 
     /// Puts the teeth of all zones into their listed order.
@@ -232,40 +235,17 @@ impl AngleExtremes {
 
 /// Receives peaks only.
 pub(super) struct PeakSink {
-    /// Peaks of force and stress.
-    peaks: PerContact<[PlacedPeak; 2]>,
+    contacts: PerContact<PeaksSoFar>,
     angles: AngleExtremes,
 }
 
-/// Largest value so far, and the state in which it occurs.
-#[derive(Clone, Copy, Default)]
-struct PlacedPeak {
-    value: f64,
-    input_angle_deg: f64,
-    position_deg: f64,
-    /// Force in that state, in N.
-    force_n: f64,
-}
-
-impl PlacedPeak {
-    fn peak(&self) -> Peak {
-        Peak { value: self.value, input_angle_deg: self.input_angle_deg, position_deg: self.position_deg }
-    }
-}
-
-impl Default for PeakSink {
-    fn default() -> Self {
-        Self { peaks: PerContact::default(), angles: AngleExtremes::NONE }
-    }
-}
-
 impl PeakSink {
+    pub(super) fn new() -> Self {
+        Self { contacts: PerContact::of(|_| PeaksSoFar::NONE), angles: AngleExtremes::NONE }
+    }
+
     pub(super) fn peaks(self, drive: &Drive, torque_balance_residual: f64) -> SweepPeaks {
-        let width_mm = drive.tooth_width_mm();
-        let contacts = PerContact::of(|contact| {
-            let [force, stress] = self.peaks.get(contact);
-            ContactPeaks::of_line(force.peak(), stress.peak(), stress.force_n, width_mm)
-        });
+        let contacts = PerContact::of(|contact| self.contacts.get(contact).of_line(drive.tooth_width_mm()));
         self.angles.peaks(contacts, None, torque_balance_residual)
     }
 }
@@ -280,17 +260,20 @@ impl Sink for PeakSink {
         for contact in Contact::all() {
             let (force, scale) = (&tile.force.get(contact)[..count], &tile.scale[..count]);
             let (stress, root) = (&tile.stress.get(contact)[..count], &tile.stress_scale(contact)[..count]);
-            for (peak, (unit, factor)) in zip(self.peaks.get_mut(contact), [(force, scale), (stress, root)]) {
-                let value = largest_product(unit, factor);
-                if value > peak.value {
-                    let at = first_product(unit, factor, value).unwrap_or(0);
-                    *peak = PlacedPeak {
-                        value,
-                        input_angle_deg: tile.row_input_angle_deg[at / teeth],
-                        position_deg: tile.position_deg_of(at),
-                        force_n: force[at] * scale[at],
-                    };
-                }
+            let peaks = self.contacts.get_mut(contact);
+            let peak = |value: f64, at: usize| Peak {
+                value,
+                input_angle_deg: tile.row_input_angle_deg[at / teeth],
+                position_deg: tile.position_deg_of(at),
+            };
+            let force_n = largest_product(force, scale);
+            if force_n > peaks.force_n.value {
+                peaks.force_n = peak(force_n, first_product(force, scale, force_n).unwrap_or(0));
+            }
+            let stress_mpa = largest_product(stress, root);
+            if stress_mpa > peaks.stress_mpa.value {
+                let at = first_product(stress, root, stress_mpa).unwrap_or(0);
+                (peaks.stress_mpa, peaks.force_at_stress_n) = (peak(stress_mpa, at), force[at] * scale[at]);
             }
         }
     }

@@ -10,7 +10,7 @@ use super::pressures::Pressures;
 use super::shape::{EllipseShape, Shape};
 use super::sinks::Sink;
 use super::tile::{Tile, TileLanes};
-use super::unit::{Newton, NewtonOnBall, Unit};
+use super::unit::{Newton, Unit};
 use super::{Kernel, Law};
 
 impl Kernel {
@@ -19,8 +19,8 @@ impl Kernel {
     pub(super) fn unit_loads<V: Simd, K: Sink>(&self, tile: &mut Tile<'_>) -> bool {
         let are_found = match (&self.law, &self.pressures) {
             (Law::Linear(compliance), _) => self.loads_of::<K>(*compliance, tile),
-            (Law::Sharing(_), Pressures::Ellipses(_)) => self.loads_of::<K>(NewtonOnBall, tile),
-            (Law::Sharing(_), _) => self.loads_of::<K>(Newton, tile),
+            (Law::Sharing(_), Pressures::Ellipses(_)) => self.loads_of::<K>(Newton::<true>, tile),
+            (Law::Sharing(_), _) => self.loads_of::<K>(Newton::<false>, tile),
         };
         are_found && self.pressures.finish::<V>(tile)
     }

@@ -11,10 +11,10 @@ pub(super) trait Unit: Copy {
     /// Returns `F_H` over `d²`, given the reciprocal of that divisor.
     fn load(self, lever: f64, per_denominator: f64) -> f64;
 
-    /// Returns the value stored as stress: `√(F Σ E*/(π L1))` for a line contact of relative curvature Σ.
+    /// Returns the value stored as stress.
     #[inline(always)]
     fn stress(self, force: f64, curvature: f64, hertz: f64) -> f64 {
-        (force * curvature * hertz).sqrt()
+        line_stress(force, curvature, hertz)
     }
 }
 
@@ -30,11 +30,11 @@ impl Unit for Compliance {
     }
 }
 
-/// 1 N at the wave generator.
+/// 1 N at the wave generator. Balls, which have no line contacts, store curvatures in place of stresses.
 #[derive(Clone, Copy)]
-pub(super) struct Newton;
+pub(super) struct Newton<const BALLS: bool>;
 
-impl Unit for Newton {
+impl<const BALLS: bool> Unit for Newton<BALLS> {
     #[inline(always)]
     fn denominator(self, above2: f64, lever2: f64) -> f64 {
         above2 + lever2
@@ -44,27 +44,17 @@ impl Unit for Newton {
     fn load(self, _: f64, per_denominator: f64) -> f64 {
         per_denominator
     }
+
+    #[inline(always)]
+    fn stress(self, force: f64, curvature: f64, hertz: f64) -> f64 {
+        if BALLS { curvature * hertz } else { line_stress(force, curvature, hertz) }
+    }
 }
 
-/// 1 N at the wave generator of a tooth without line contacts: stores curvatures in place of stresses.
-#[derive(Clone, Copy)]
-pub(super) struct NewtonOnBall;
-
-impl Unit for NewtonOnBall {
-    #[inline(always)]
-    fn denominator(self, above2: f64, lever2: f64) -> f64 {
-        Newton.denominator(above2, lever2)
-    }
-
-    #[inline(always)]
-    fn load(self, lever: f64, per_denominator: f64) -> f64 {
-        Newton.load(lever, per_denominator)
-    }
-
-    #[inline(always)]
-    fn stress(self, _: f64, curvature: f64, hertz: f64) -> f64 {
-        curvature * hertz
-    }
+/// `√(F Σ E*/(π L1))` of a line contact of relative curvature Σ.
+#[inline(always)]
+fn line_stress(force: f64, curvature: f64, hertz: f64) -> f64 {
+    (force * curvature * hertz).sqrt()
 }
 
 /// `c d²` of a tooth under a linear law: coefficients of `(h + r)²` and `h'²`, which add up to `d²`.

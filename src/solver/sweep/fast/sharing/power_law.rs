@@ -13,7 +13,7 @@ use crate::tooth::point::EllipticContact;
 
 /// Power law `ξ = c F^p`.
 pub(crate) struct PowerLaw<P> {
-    pub(super) power: P,
+    pub(in crate::sweep::fast) power: P,
     pub(super) has_gaps: bool,
 }
 
@@ -41,7 +41,7 @@ pub(crate) trait Power {
 
 /// A linear law with gaps, or for flat-sided teeth, whose compliance is given.
 pub(crate) struct Linear {
-    pub(super) compliance_mm_per_n: PerContact<f64>,
+    pub(in crate::sweep::fast) compliance_mm_per_n: PerContact<f64>,
     pub(super) weights: Weights,
 }
 

@@ -7,9 +7,13 @@ use super::{
     LAST_FORCE_STEP, Limit, MAX_ROUNDS, NOTHING, Shared, Teeth, Weights, Work, forces_at_stress, last_below,
     least_margin, least_torque, press, start_above, turn_to_limit,
 };
-use crate::contact::PerContact;
-use crate::contact_law::PALMGREN_EXPONENT;
+use crate::contact::{Contact, PerContact};
+use crate::contact_law::{LogarithmicTerm, PALMGREN_EXPONENT};
+use crate::load_sharing::LoadedDrive;
 use crate::sweep::fast::lanes::{LANES, inverse_tenth_root, largest, ln, ln_roughly};
+
+/// Substitute for the force limit of a flat, to which the limit of Johnson's law does not apply.
+const NEVER_TOO_WIDE_N: f64 = 1e100;
 
 /// A law without a closed form for both the forces and the rotation.
 pub(crate) struct NoPowerLaw<L> {
@@ -88,13 +92,39 @@ impl TwoParts for PalmgrenAndLinear {
 /// `ξ = F (A - B ln F)`, Johnson's law, by virtual work.
 pub(crate) struct Logarithm {
     /// `A` of each contact, including the series compliance.
-    pub(super) compliance: PerContact<f64>,
+    compliance: PerContact<f64>,
     /// `B` of each contact.
-    pub(super) growth: PerContact<f64>,
+    growth: PerContact<f64>,
     /// Force at which half a contact's width is the reference length of the law. At wave generator and ring it is
     /// divided by the square of the stress under 1 N, without the ratio of forces. At the carrier it is the force
     /// itself.
-    pub(super) reference: PerContact<f64>,
+    reference: PerContact<f64>,
+}
+
+impl Logarithm {
+    pub(super) fn new(
+        loaded: &LoadedDrive<'_>,
+        law: &PerContact<LogarithmicTerm>,
+        series_mm_per_n: &PerContact<f64>,
+    ) -> Self {
+        let reference = |contact| {
+            let LogarithmicTerm { growth_mm_per_n, length_mm, .. } = *law.get(contact);
+            let of_curvature = length_mm * length_mm / (4.0 * growth_mm_per_n);
+            match contact {
+                // σ² = F Σ E*/(π L1), F = 1 at the wave generator and F_K/F_H at the ring.
+                Contact::WaveGenerator | Contact::Ring => {
+                    of_curvature / loaded.hertz(contact).modulus_per_width_mpa_per_mm()
+                }
+                Contact::Carrier if growth_mm_per_n > 0.0 => of_curvature / loaded.drive().parameters().tooth_radius_mm,
+                Contact::Carrier => NEVER_TOO_WIDE_N,
+            }
+        };
+        Self {
+            compliance: PerContact::of(|contact| law.get(contact).compliance_mm_per_n + series_mm_per_n.get(contact)),
+            growth: PerContact::of(|contact| law.get(contact).growth_mm_per_n),
+            reference: PerContact::of(reference),
+        }
+    }
 }
 
 impl TwoParts for Logarithm {
