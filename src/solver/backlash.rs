@@ -348,7 +348,7 @@ impl<'a> Flanks<'a> {
 
     /// Returns the pieces of a lap. Those of the mirrored lap are the same in reverse order.
     fn pieces(&self) -> Result<Vec<Piece>, NotConverged> {
-        let relief = self.front.modification().ring_tip_relief;
+        let relief = self.front.modification.ring_tip_relief;
         let relieved = relief.map(|relief| self.mesh.fraction_at_deg(relief.start_deg));
         let cuts = [Some(self.mesh.entry_fraction()), relieved].into_iter().flatten();
         let mut ends: Vec<_> = cuts.flat_map(|cut| [cut, 1.0 - cut]).chain([0.0, 1.0]).collect();

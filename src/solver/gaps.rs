@@ -284,9 +284,9 @@ impl Modification {
 #[derive(Debug, Clone, Copy)]
 pub struct Gaps<'a> {
     drive: &'a Drive,
-    clearance_mm: PerContact<f64>,
-    modification: Modification,
-    deviations: Option<&'a Deviations>,
+    pub(crate) clearance_mm: PerContact<f64>,
+    pub(crate) modification: Modification,
+    pub(crate) deviations: Option<&'a Deviations>,
     usual: Usual,
 }
 
@@ -363,18 +363,6 @@ impl<'a> Gaps<'a> {
     /// True if the gaps are the same for every tooth and position.
     pub(crate) fn are_uniform(&self) -> bool {
         self.deviations.is_none() && self.modification.first().is_none()
-    }
-
-    pub(crate) const fn clearance_mm(&self) -> &PerContact<f64> {
-        &self.clearance_mm
-    }
-
-    pub(crate) const fn modification(&self) -> &Modification {
-        &self.modification
-    }
-
-    pub(crate) const fn deviations(&self) -> Option<&'a Deviations> {
-        self.deviations
     }
 
     /// Returns the gap at each contact of a tooth, along its normal; negative for interference.

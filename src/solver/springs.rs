@@ -72,10 +72,10 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
             let displacement_mm = spring.displacement_mm(rotation);
             if displacement_mm > 0.0 {
                 let force = spring.approach.force(displacement_mm)?;
-                let torque_nmm = self.zones * force.force_n * spring.turned_static_arm_mm(rotation);
+                let torque_nmm = self.zones * force.force_n * spring.turned_arm_mm(rotation);
                 torque.value += torque_nmm;
                 // dF/dΔφ = F |h'|/((Δφ |h'| - g) d ln ξ/d ln F)
-                torque.slope += torque_nmm * (spring.turned_travel_arm_mm(rotation) / displacement_mm) / force.exponent;
+                torque.slope += torque_nmm * (spring.turned_arm_mm(rotation) / displacement_mm) / force.exponent;
                 torque.slope -= self.zones * force.force_n * spring.arm_decline_mm_per_rad;
             }
         }
@@ -88,7 +88,7 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
     /// # Errors
     /// [`NotConverged`] if the remaining equation is not solved.
     pub fn wind_up(&self, torque_nmm: f64) -> Result<Option<WindUp>, NotConverged> {
-        if !self.iter().any(Spring::has_arms) {
+        if !self.iter().any(Spring::has_arm) {
             return Ok(None);
         }
         let found = self.rotation(torque_nmm, None)?;
@@ -207,16 +207,12 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         let (mut least, mut most) = (0.0, 0.0);
         for spring in self.iter().filter(|spring| spring.can_carry()) {
             let ways_mm = [near, far].map(|rotation| spring.displacement_mm(rotation));
-            let arms_mm = [near, far].map(|rotation| spring.turned_static_arm_mm(rotation));
-            let squares_mm2 = [near, far]
-                .map(|rotation| spring.turned_static_arm_mm(rotation) * spring.turned_travel_arm_mm(rotation));
+            let arms_mm = [near, far].map(|rotation| spring.turned_arm_mm(rotation));
+            let squares_mm2 = arms_mm.map(|arm_mm| arm_mm * arm_mm);
             let is_passed = arms_mm[0] > 0.0 && arms_mm[1] < 0.0;
             let decline_mm = spring.arm_decline_mm_per_rad;
-            let largest_mm = if is_passed {
-                spring.travel_arm_mm * spring.travel_arm_mm / (2.0 * decline_mm)
-            } else {
-                ways_mm[0].max(ways_mm[1])
-            };
+            let largest_mm =
+                if is_passed { spring.arm_mm * spring.arm_mm / (2.0 * decline_mm) } else { ways_mm[0].max(ways_mm[1]) };
             let (lesser, larger) =
                 (spring.force_and_stiffness(ways_mm[0].min(ways_mm[1]))?, spring.force_and_stiffness(largest_mm)?);
             let least_square_mm2 = if is_passed { 0.0 } else { squares_mm2[0].min(squares_mm2[1]) };
@@ -280,10 +276,10 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
     fn gapless_rad(&self, torque_nmm: f64) -> Option<f64> {
         let exponent = self.common_exponent().filter(|_| !self.has_declining_arms())?;
         let torque_of_unit = self.iter().map(|spring| {
-            let (travel, arm) = (spring.travel_arm_mm, spring.static_arm_mm);
+            let arm = spring.arm_mm;
             match spring.approach {
-                Approach::Power { coefficient, .. } => arm * (travel / coefficient).powf(1.0 / exponent),
-                Approach::Linear { compliance_mm_per_n } => arm * (travel / compliance_mm_per_n),
+                Approach::Power { coefficient, .. } => arm * (arm / coefficient).powf(1.0 / exponent),
+                Approach::Linear { compliance_mm_per_n } => arm * (arm / compliance_mm_per_n),
                 // No exponent.
                 Approach::Logarithmic(_) | Approach::Corner(_) => 0.0,
             }
@@ -309,8 +305,8 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         }
         if self.common_exponent() == Some(1.0) {
             let (mut stiffness, mut torque_of_unit) = (0.0, 0.0);
-            for Spring { travel_arm_mm, static_arm_mm, closing_rad: own_rad, approach, .. } in self.iter() {
-                let share = static_arm_mm * (travel_arm_mm / approach.approach_mm(1.0));
+            for Spring { arm_mm, closing_rad: own_rad, approach, .. } in self.iter() {
+                let share = arm_mm * (arm_mm / approach.approach_mm(1.0));
                 stiffness += share;
                 torque_of_unit += share * (closing_rad - own_rad);
             }
@@ -367,13 +363,12 @@ impl<'a, S: AsRef<Spring>> Springs<'a, S> {
         const ARM_SHARE: f64 = 0.25;
         // For any distribution of the torque, a rotation at which every spring carries its part, ignoring its earlier
         // closing, is sufficient. Forces proportional to the arm are close to the true ones.
-        let longest_mm = self.iter().map(|spring| spring.static_arm_mm).fold(0.0, f64::max);
-        let shares =
-            || self.iter().filter(move |spring| spring.has_arms() && spring.static_arm_mm >= ARM_SHARE * longest_mm);
-        let squares: f64 = shares().map(|spring| spring.static_arm_mm * spring.static_arm_mm).sum();
+        let longest_mm = self.iter().map(|spring| spring.arm_mm).fold(0.0, f64::max);
+        let shares = || self.iter().filter(move |spring| spring.has_arm() && spring.arm_mm >= ARM_SHARE * longest_mm);
+        let squares: f64 = shares().map(|spring| spring.arm_mm * spring.arm_mm).sum();
         let force_per_arm = torque_nmm / (self.zones * squares);
         let by_share_rad = shares()
-            .map(|spring| spring.approach.approach_mm(force_per_arm * spring.static_arm_mm) / spring.travel_arm_mm)
+            .map(|spring| spring.approach.approach_mm(force_per_arm * spring.arm_mm) / spring.arm_mm)
             .fold(0.0, f64::max);
         // The torque is convex, so it exceeds its tangent at the last closing angle.
         let at_closing = self.torque_nmm(&Rotation { closing_rad, excess_rad: 0.0 })?;

@@ -490,7 +490,7 @@ fn turned_space_moves_its_corner_by_its_arm() {
             let place = Place { slot: 0, ring_space: 0, lobe: 0 };
             let tooth = loaded.tooth_at(&place, Position::from_lobe(position_deg.to_radians(), 2)).unwrap();
             let gap_mm = seen(&drive, position_deg, f64::to_radians(arcsec / 3600.0)).gap_mm;
-            (tooth.spring.closing_rad * tooth.spring.travel_arm_mm, tooth.force_ratio.ring * gap_mm)
+            (tooth.spring.closing_rad * tooth.spring.arm_mm, tooth.force_ratio.ring * gap_mm)
         };
         let (turned, as_it_is) = (way_mm(0.01), way_mm(0.0));
         let (found_mm, expected_mm) = (turned.0 - as_it_is.0, turned.1 - as_it_is.1);
@@ -514,7 +514,7 @@ fn turned_slot_moves_tooth_by_slot_force_share() {
             loaded.tooth_at(&Place { slot: 0, ring_space: 0, lobe: 0 }, position).unwrap()
         };
         let (turned, as_it_is) = (tooth(0.01), tooth(0.0));
-        let found_mm = (turned.spring.closing_rad - as_it_is.spring.closing_rad) * as_it_is.spring.travel_arm_mm;
+        let found_mm = (turned.spring.closing_rad - as_it_is.spring.closing_rad) * as_it_is.spring.arm_mm;
         let wall_mm = f64::to_radians(0.01 / 3600.0) * as_it_is.center.center_radius_mm;
         let expected_mm = as_it_is.force_ratio.carrier * wall_mm;
         assert!((found_mm / expected_mm - 1.0).abs() < 1e-5, "{beyond_deg} deg: {found_mm} mm, {expected_mm} mm");

@@ -157,10 +157,7 @@ fn passed_tooth_is_released_gradually() {
     let peak_n = forces.iter().copied().fold(0.0, f64::max);
     let at = |share: f64| {
         let tooth = loaded.tooth(Position::from_lobe(share * turned_rad, 2)).unwrap();
-        (
-            loaded.forces_n(&tooth, &wind_up).unwrap().wave_generator,
-            tooth.spring.turned_static_arm_mm(&wind_up.rotation),
-        )
+        (loaded.forces_n(&tooth, &wind_up).unwrap().wave_generator, tooth.spring.turned_arm_mm(&wind_up.rotation))
     };
     let (before, on_lobe, passed, left) = (at(1.5), at(1.0), at(0.75), at(0.45));
     assert!(before.0 > on_lobe.0 && on_lobe.0 > passed.0 && passed.0 > 0.0 && left.0 == 0.0);
@@ -185,7 +182,7 @@ fn tooth_in_valley_closes_gap_after_rotation() {
         assert!((lifted_mm(closing_rad) / 0.01 - 1.0).abs() < 0.02, "{closing_rad}: {}", lifted_mm(closing_rad));
         let further = Rotation { closing_rad, excess_rad: 0.5 * closing_rad };
         assert!(tooth.spring.force_n(&further).unwrap() > 0.0);
-        assert!(tooth.spring.turned_static_arm_mm(&further) > 0.0);
+        assert!(tooth.spring.turned_arm_mm(&further) > 0.0);
         // It carries its share beside a tooth with an arm.
         let lifted = loaded.tooth(Position::from_lobe(1.0 / f64::from(lobes), lobes)).unwrap();
         let both = [lifted, tooth];
@@ -251,7 +248,7 @@ fn tooth_of_turned_slot_closes_remaining_gaps() {
             assert!(closing_rad > from_rad, "{arcsec} at {position_rad}: {closing_rad}");
             assert!((left_mm / gap_mm - 1.0).abs() < 1e-6, "{arcsec} at {position_rad}: {left_mm} of {gap_mm}");
             let left_arm_mm = arm_mm - decline_mm * closing_rad;
-            assert!((tooth.spring.travel_arm_mm / left_arm_mm - 1.0).abs() < 1e-6, "{arcsec} at {position_rad}");
+            assert!((tooth.spring.arm_mm / left_arm_mm - 1.0).abs() < 1e-6, "{arcsec} at {position_rad}");
         }
     }
 }
@@ -560,7 +557,7 @@ fn wave_generator_passes_lobe_tooth_to_reach_others() {
     let loaded = LoadedDrive::new(&drive, &case).unwrap();
     let teeth = [0.002, 0.4, 0.8].map(|position_rad| loaded.tooth(Position::from_lobe(position_rad, 2)).unwrap());
     let springs = Springs::new(&teeth, 2.0);
-    let passed_rad = 2.0 * teeth[0].spring.travel_arm_mm / teeth[0].spring.arm_decline_mm_per_rad;
+    let passed_rad = 2.0 * teeth[0].spring.arm_mm / teeth[0].spring.arm_decline_mm_per_rad;
     assert!(teeth[1].spring.closing_rad > passed_rad);
     let found = springs.wind_up(1e3).unwrap().unwrap();
     assert!(found.rotation.rad() > teeth[1].spring.closing_rad);

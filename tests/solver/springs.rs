@@ -166,17 +166,11 @@ fn crate_refuses_gap_that_projection_turns_into_load() {
 fn early_tooth_of_tiny_arm_costs_no_digits() {
     // The first tooth alone would need 1e9 rad. The next one's approach is 1e-15 of the first one's way.
     let approach = Approach::Linear { compliance_mm_per_n: 1e-6 };
-    let spring = |arm_mm: f64, closing_rad| Spring {
-        travel_arm_mm: arm_mm,
-        static_arm_mm: arm_mm,
-        arm_decline_mm_per_rad: 0.0,
-        closing_rad,
-        approach,
-    };
+    let spring = |arm_mm: f64, closing_rad| Spring { arm_mm, arm_decline_mm_per_rad: 0.0, closing_rad, approach };
     let springs = [spring(1e-12, 0.0), spring(1.7, 1.1), spring(1.9, 2.3)];
     let wind_up = Springs::new(&springs, 2.0).wind_up(1e-9).unwrap().unwrap();
     let torque: f64 =
-        springs.iter().map(|spring| 2.0 * spring.force_n(&wind_up.rotation).unwrap() * spring.static_arm_mm).sum();
+        springs.iter().map(|spring| 2.0 * spring.force_n(&wind_up.rotation).unwrap() * spring.arm_mm).sum();
     assert!((torque / 1e-9 - 1.0).abs() < 1e-14, "{torque:e}");
     assert_eq!(wind_up.rotation.closing_rad, 1.1);
 }
@@ -195,8 +189,7 @@ impl AsRef<Spring> for Counted {
 fn loaded_teeth_are_found_in_few_passes() {
     let looks = |count: u32, torque_nmm: f64| {
         let spring = |i: u32| Spring {
-            travel_arm_mm: 1.0,
-            static_arm_mm: 1.0,
+            arm_mm: 1.0,
             arm_decline_mm_per_rad: 0.0,
             // Unsorted and all different.
             closing_rad: 1e-6 * f64::from(i * 7919 % count),
@@ -229,9 +222,8 @@ fn any_approach() -> impl Strategy<Value = Approach> {
 }
 
 prop_compose! {
-    fn any_spring()(approach in any_approach(), arm in -6.0_f64..2.0, ratio in 0.7_f64..1.4, closing in prop::option::of(-9.0_f64..1.0)) -> Spring {
-        let travel_arm_mm = 10.0_f64.powf(arm);
-        Spring { travel_arm_mm, static_arm_mm: ratio * travel_arm_mm, arm_decline_mm_per_rad: 0.0, closing_rad: closing.map_or(0.0, |power| 10.0_f64.powf(power)), approach }
+    fn any_spring()(approach in any_approach(), arm in -6.0_f64..2.0, closing in prop::option::of(-9.0_f64..1.0)) -> Spring {
+        Spring { arm_mm: 10.0_f64.powf(arm), arm_decline_mm_per_rad: 0.0, closing_rad: closing.map_or(0.0, |power| 10.0_f64.powf(power)), approach }
     }
 }
 
@@ -278,7 +270,7 @@ proptest! {
         let mut torque = 0.0;
         for spring in &springs {
             let force_n = spring.force_n(&wind_up.rotation).unwrap();
-            torque += 2.0 * force_n * spring.static_arm_mm;
+            torque += 2.0 * force_n * spring.arm_mm;
             // A spring carries exactly if its gap is closed.
             prop_assert!((force_n > 0.0) == (wind_up.rotation_rad() > spring.closing_rad) || (spring.closing_rad - wind_up.rotation_rad()).abs() < 1e-15 * spring.closing_rad);
         }
@@ -293,7 +285,7 @@ fn any_declining_spring() -> impl Strategy<Value = Spring> {
     let exponent = prop::sample::select(vec![1.0, 0.9, 2.0 / 3.0, 0.5]);
     let gap = prop::option::of(0.02_f64..0.5);
     (exponent, -6.0_f64..-2.0, -1.0_f64..1.5, 0.05_f64..2.0, gap).prop_map(|(exponent, power, arm, end_rad, gap)| {
-        let (coefficient, travel_arm_mm) = (10.0_f64.powf(power), 10.0_f64.powf(arm));
+        let (coefficient, arm_mm) = (10.0_f64.powf(power), 10.0_f64.powf(arm));
         let approach = if exponent == 1.0 {
             Approach::Linear { compliance_mm_per_n: coefficient }
         } else {
@@ -301,14 +293,8 @@ fn any_declining_spring() -> impl Strategy<Value = Spring> {
         };
         // The gap must close before the arm ends.
         let gap = gap.unwrap_or(0.0);
-        let left_mm = travel_arm_mm * (1.0 - gap);
-        Spring {
-            travel_arm_mm: left_mm,
-            static_arm_mm: left_mm,
-            arm_decline_mm_per_rad: travel_arm_mm / end_rad,
-            closing_rad: gap * end_rad,
-            approach,
-        }
+        let left_mm = arm_mm * (1.0 - gap);
+        Spring { arm_mm: left_mm, arm_decline_mm_per_rad: arm_mm / end_rad, closing_rad: gap * end_rad, approach }
     })
 }
 
@@ -391,8 +377,7 @@ proptest! {
             let rotation = |power: i32| {
                 let unit = 2.0_f64.powi(power);
                 let in_unit = |spring: &Spring| Spring {
-                    travel_arm_mm: unit * spring.travel_arm_mm,
-                    static_arm_mm: unit * spring.static_arm_mm,
+                    arm_mm: unit * spring.arm_mm,
                     arm_decline_mm_per_rad: unit * spring.arm_decline_mm_per_rad,
                     closing_rad: spring.closing_rad,
                     approach: match spring.approach {
@@ -419,8 +404,7 @@ proptest! {
 #[test]
 fn closing_spring_carries_when_others_decline() {
     let spring = |arm_decline_mm_per_rad: f64, closing_rad: f64, approach: Approach| Spring {
-        travel_arm_mm: 1.0 - arm_decline_mm_per_rad * closing_rad,
-        static_arm_mm: 1.0 - arm_decline_mm_per_rad * closing_rad,
+        arm_mm: 1.0 - arm_decline_mm_per_rad * closing_rad,
         arm_decline_mm_per_rad,
         closing_rad,
         approach,
@@ -442,8 +426,7 @@ fn closing_spring_carries_when_others_decline() {
 #[test]
 fn torque_below_next_closing_is_carried_by_first() {
     let spring = |arm_mm: f64, end_rad: f64, closing_rad: f64, compliance_mm_per_n: f64| Spring {
-        travel_arm_mm: arm_mm * (1.0 - closing_rad / end_rad),
-        static_arm_mm: arm_mm * (1.0 - closing_rad / end_rad),
+        arm_mm: arm_mm * (1.0 - closing_rad / end_rad),
         arm_decline_mm_per_rad: arm_mm / end_rad,
         closing_rad,
         approach: Approach::Linear { compliance_mm_per_n },
@@ -465,8 +448,7 @@ fn torque_below_next_closing_is_carried_by_first() {
 fn search_never_passes_a_maximum_of_all_springs() {
     for shorter in [1.0, 1e-6, 1e-12, 1e-18, 1e-24] {
         let spring = |end_rad: f64, compliance_mm_per_n: f64| Spring {
-            travel_arm_mm: shorter * 5.0 * (1.0 - 0.1 / end_rad),
-            static_arm_mm: shorter * 5.0 * (1.0 - 0.1 / end_rad),
+            arm_mm: shorter * 5.0 * (1.0 - 0.1 / end_rad),
             arm_decline_mm_per_rad: 5.0 / end_rad,
             closing_rad: shorter * 0.1,
             approach: Approach::Linear { compliance_mm_per_n },
@@ -488,8 +470,7 @@ fn search_never_passes_a_maximum_of_all_springs() {
 #[test]
 fn torque_at_next_closing_is_carried_there() {
     let spring = |arm_mm: f64, closing_rad: f64| Spring {
-        travel_arm_mm: arm_mm,
-        static_arm_mm: arm_mm,
+        arm_mm,
         arm_decline_mm_per_rad: 1.0,
         closing_rad,
         approach: Approach::Power { exponent: 0.9, coefficient: 1e-5, compliance_mm_per_n: 0.0 },

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::equilibrium::{Compatibility, ToothState};
 use super::load::LoadCase;
 use crate::SolveError;
-use crate::contact::{Contact, HertzLine, PerContact};
+use crate::contact::PerContact;
 use crate::contact_law::ContactLaw;
 use crate::drive::{Drive, ToothShape};
 use crate::gaps::{Deviations, Gaps};
@@ -14,7 +14,7 @@ use crate::ring::TipCorner;
 use crate::ring_bending::RingBending;
 use crate::root::NotConverged;
 use crate::springs::{Springs, WindUp};
-use crate::tooth::{BallContact, Contacts, Flat};
+use crate::tooth::Contacts;
 use crate::violation::{Parameter, Violation};
 
 /// A drive under a load, with everything precomputed that does not depend on the position.
@@ -24,17 +24,17 @@ pub struct LoadedDrive<'a> {
     pub(super) mesh: Mesh,
     pub(super) compatibility: Compatibility,
     /// Factor from a sum over the listed teeth to the sum over all teeth.
-    zones: f64,
+    pub(crate) zones: f64,
     pub(super) input_torque_nmm: f64,
     pub(super) law: ContactLaw,
-    pub(super) contacts: Contacts,
+    pub(crate) contacts: Contacts,
     pub(super) ring_bending: Option<RingBending>,
     pub(super) wave_generator_moves: bool,
     pub(super) tip_corner: Option<TipCorner>,
     /// Growth of the corner's compliance for each unit of the logarithm by which a contact there is narrower, if the
     /// ring's teeth bend.
     pub(super) corner_growth_mm_per_n: f64,
-    pub(super) gaps: Gaps<'a>,
+    pub(crate) gaps: Gaps<'a>,
 }
 
 impl<'a> LoadedDrive<'a> {
@@ -124,11 +124,6 @@ impl<'a> LoadedDrive<'a> {
         Self { mesh: self.mesh.as_one_zone(), zones, ..*self }
     }
 
-    /// Returns the factor from a sum over the listed teeth to the sum over all teeth.
-    pub(crate) const fn zones(&self) -> f64 {
-        self.zones
-    }
-
     /// Returns the drive.
     pub const fn drive(&self) -> &'a Drive {
         self.drive
@@ -171,25 +166,6 @@ impl<'a> LoadedDrive<'a> {
         }
         let center = self.drive.flank().locus().at(self.drive.flank_limit().position)?;
         Ok(center.center_radius_mm / center.cam_contact.lever_arm_mm)
-    }
-
-    /// Returns a ball contact for column-wise evaluation.
-    pub(crate) fn ball(&self, contact: Contact) -> Option<BallContact> {
-        self.contacts.ball(contact)
-    }
-
-    /// Returns the flat of flat-sided teeth for column-wise evaluation.
-    pub(crate) fn flat(&self) -> Option<Flat> {
-        self.contacts.flat()
-    }
-
-    pub(crate) const fn gaps(&self) -> &Gaps<'a> {
-        &self.gaps
-    }
-
-    /// Returns the Hertz stress law of a contact.
-    pub(crate) const fn hertz(&self, contact: Contact) -> &HertzLine {
-        self.contacts.hertz(contact)
     }
 
     /// Returns `M0` in N·mm.
@@ -244,7 +220,7 @@ impl<'a> LoadedDrive<'a> {
 
     /// Returns the reason why teeth carry no torque, or less than the required torque.
     pub(crate) fn carries_nothing(&self, teeth: &[ToothState]) -> SolveError {
-        if self.wave_generator_moves && teeth.iter().any(|tooth| tooth.spring.static_arm_mm > 0.0) {
+        if self.wave_generator_moves && teeth.iter().any(|tooth| tooth.spring.arm_mm > 0.0) {
             SolveError::TurnedPastTeeth
         } else {
             SolveError::NoLeverArm

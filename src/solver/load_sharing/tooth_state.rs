@@ -167,7 +167,8 @@ impl<'a> LoadedDrive<'a> {
         let center_radius_mm = center.center_radius_mm;
         let pressure = self.contacts.pressure(contact, curvature_per_mm, center_radius_mm)?;
         // Before the flank such a tooth carries no load.
-        let unpressed = || self.corner_at(&center.position).and(self.flat()).map(|flat| Pressure::Flat(flat.whole()));
+        let unpressed =
+            || self.corner_at(&center.position).and(self.contacts.flat()).map(|flat| Pressure::Flat(flat.whole()));
         pressure.or_else(unpressed).ok_or_else(|| {
             let position_deg = center.position.from_lobe_deg();
             SolveError::FlatOffCarrier { position_deg, center_radius_mm }
@@ -176,7 +177,7 @@ impl<'a> LoadedDrive<'a> {
 
     /// Returns true if a tooth's flat lies outside its slot's walls.
     fn has_left_slot(&self, center: &ToothCenter) -> bool {
-        self.flat().is_some_and(|flat| flat.borne_mm(center.center_radius_mm) <= 0.0)
+        self.contacts.flat().is_some_and(|flat| flat.borne_mm(center.center_radius_mm) <= 0.0)
     }
 
     /// Returns the pressure at the middle of each contact of a tooth, integrated along its path over the part. Wear

@@ -7,12 +7,10 @@ use crate::root::{NotConverged, ValueAndSlope};
 /// A tooth in load sharing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spring {
-    /// Displacement along `F_H` for each radian of the wave generator, gaps closed: `|h'|` by kinematics.
-    pub travel_arm_mm: f64,
-    /// Torque at the wave generator for each newton of `F_H`, gaps closed: `|h'|` by statics. Friction would make them
-    /// differ.
-    pub static_arm_mm: f64,
-    /// Decrease of both arms for each further radian of the wave generator; 0 if lever arms do not vary with wind-up.
+    /// `|h'|` with the gaps closed: displacement along `F_H` for each radian of the wave generator, and torque at the
+    /// wave generator for each newton of `F_H`.
+    pub arm_mm: f64,
+    /// Decrease of the arm for each further radian of the wave generator; 0 if lever arms do not vary with wind-up.
     pub arm_decline_mm_per_rad: f64,
     /// Rotation of the wave generator until the gaps at this tooth are closed, `g/|h'|`; infinite if they never close.
     /// Lost motion common to all teeth may be excluded; the rest may be negative.
@@ -57,7 +55,7 @@ impl Gap {
 }
 
 impl Spring {
-    /// Builds the spring of a tooth with a gap (or none) and one arm for travel and statics. The arm applies after the
+    /// Builds the spring of a tooth with a gap (or none). The arm applies after the
     /// common lost motion. A tooth without an arm never closes a gap, unless the arm grows with the rotation. A tooth
     /// whose arm becomes zero first does not close it either.
     pub(crate) fn new(
@@ -69,7 +67,7 @@ impl Spring {
     ) -> Self {
         let Closing { rad: closing_rad, arm_mm } =
             gap.map_or(Closing { rad: 0.0, arm_mm }, |gap| gap.closing(arm_mm, usual_rad, arm_decline_mm_per_rad));
-        Self { travel_arm_mm: arm_mm, static_arm_mm: arm_mm, arm_decline_mm_per_rad, closing_rad, approach }
+        Self { arm_mm, arm_decline_mm_per_rad, closing_rad, approach }
     }
 
     /// Returns the rotation beyond the closing angle without loss of digits; negative while a gap is open.
@@ -81,33 +79,24 @@ impl Spring {
     /// before.
     pub fn displacement_mm(&self, wind_up: &Rotation) -> f64 {
         let closed_rad = self.closed_rad(wind_up);
-        let displacement_mm = closed_rad * (self.travel_arm_mm - 0.5 * self.arm_decline_mm_per_rad * closed_rad);
+        let displacement_mm = closed_rad * (self.arm_mm - 0.5 * self.arm_decline_mm_per_rad * closed_rad);
         if closed_rad > 0.0 && displacement_mm > NOTHING_MM { displacement_mm } else { 0.0 }
     }
 
     /// Returns the rotation beyond the closing angle at a displacement; infinite if it is never reached.
     pub(crate) fn excess_rad(&self, displacement_mm: f64) -> f64 {
         if self.arm_decline_mm_per_rad == 0.0 {
-            return displacement_mm / self.travel_arm_mm;
+            return displacement_mm / self.arm_mm;
         }
-        turned_rad(self.travel_arm_mm, self.arm_decline_mm_per_rad, displacement_mm)
+        turned_rad(self.arm_mm, self.arm_decline_mm_per_rad, displacement_mm)
     }
 
-    /// Returns the torque at the wave generator for each newton of `F_H` at a rotation.
-    pub fn turned_static_arm_mm(&self, wind_up: &Rotation) -> f64 {
-        self.turned_arm_mm(self.static_arm_mm, wind_up)
-    }
-
-    pub(super) fn turned_travel_arm_mm(&self, wind_up: &Rotation) -> f64 {
-        self.turned_arm_mm(self.travel_arm_mm, wind_up)
-    }
-
-    /// A gap that never closes leaves the unloaded arm.
-    fn turned_arm_mm(&self, arm_mm: f64, wind_up: &Rotation) -> f64 {
+    /// Returns the arm at a rotation. A gap that never closes leaves the unloaded arm.
+    pub fn turned_arm_mm(&self, wind_up: &Rotation) -> f64 {
         if self.closing_rad.is_finite() {
-            arm_mm - self.arm_decline_mm_per_rad * self.closed_rad(wind_up)
+            self.arm_mm - self.arm_decline_mm_per_rad * self.closed_rad(wind_up)
         } else {
-            arm_mm
+            self.arm_mm
         }
     }
 
@@ -136,17 +125,17 @@ impl Spring {
         if !self.can_carry() || self.closing_rad - rotation.closing_rad >= rotation.excess_rad {
             return true;
         }
-        let (static_mm, travel_mm) = (self.turned_static_arm_mm(rotation), self.turned_travel_arm_mm(rotation));
-        static_mm > 0.0 && static_mm * travel_mm >= self.arm_decline_mm_per_rad * self.displacement_mm(rotation)
+        let arm_mm = self.turned_arm_mm(rotation);
+        arm_mm > 0.0 && arm_mm * arm_mm >= self.arm_decline_mm_per_rad * self.displacement_mm(rotation)
     }
 
-    pub(super) const fn has_arms(&self) -> bool {
-        self.travel_arm_mm > 0.0 && self.static_arm_mm > 0.0
+    pub(super) const fn has_arm(&self) -> bool {
+        self.arm_mm > 0.0
     }
 
     /// Returns true if some rotation makes the spring carry a torque.
     pub(crate) const fn can_carry(&self) -> bool {
-        (self.has_arms() || self.arm_decline_mm_per_rad < 0.0) && self.closing_rad.is_finite()
+        (self.has_arm() || self.arm_decline_mm_per_rad < 0.0) && self.closing_rad.is_finite()
     }
 }
 

@@ -81,7 +81,7 @@ impl<const N: usize> Eq for Stretch<N> {}
 /// Returns the means of non-negative quantities to a tolerance relative to their sum, but at least 1e-10. The method is
 /// adaptive quadrature between the jumps, largest error first.
 ///
-/// Errors of the load sharing, and [`SolveError::Stopped`].
+/// # Errors
 /// Those of the load sharing, and [`SolveError::Stopped`].
 pub(crate) fn means<const N: usize>(
     loaded: &LoadedDrive<'_>,

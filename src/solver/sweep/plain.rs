@@ -178,7 +178,7 @@ impl<'a> Growing<'a> {
         let flank = self.loaded.drive().flank();
         let states = &mut self.states;
         let mut loaded_teeth = 0;
-        let zones = self.loaded.zones();
+        let zones = self.loaded.zones;
         let mut torque_nmm = PerContact::<f64>::default();
         let first = states.len() - self.teeth.len();
         for (tooth, &position_deg) in self.teeth.iter().zip(&states.position_deg[first..]) {
@@ -209,7 +209,7 @@ impl<'a> Growing<'a> {
             let sin_ring = point.tan_pressure_angle * point.cos_pressure_angle;
             // If lever arms vary, all three moments use the arm after wind-up.
             let arm_mm = center.cam_contact.lever_arm_mm;
-            let turned_mm = tooth.spring.turned_static_arm_mm(&wind_up.rotation) - arm_mm;
+            let turned_mm = tooth.spring.turned_arm_mm(&wind_up.rotation) - arm_mm;
             let moved_nmm = zones * force_n.wave_generator * turned_mm;
             torque_nmm.wave_generator += zones * force_n.wave_generator * arm_mm + moved_nmm;
             let ring_nmm = zones * force_n.ring * sin_ring * center.center_radius_mm;

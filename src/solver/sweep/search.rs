@@ -272,8 +272,6 @@ impl Search {
 mod tests {
     use super::summit::{Bends, Nodes, Run};
     use super::*;
-    use crate::mesh::Mesh;
-    use crate::{Drive, DriveParameters};
 
     /// Returns a lap of sixteen intervals with one tooth, each moment filled in by the function.
     fn seen_by(put_down: impl Fn(&mut Seen, f64)) -> Seen {
@@ -374,51 +372,6 @@ mod tests {
             seen.push(fraction)[LOADS] = 2.0;
             seen.push_pressed(std::iter::once(pressed(fraction)));
         })
-    }
-
-    #[test]
-    fn splits_piece_where_tooth_reaches_relief_start() {
-        let mesh = Mesh::new(&Drive::new(&DriveParameters::default()).expect("a possible drive"));
-        let whole = Piece { lap: 0, start: 0.0, end: 1.0, places: 7, at_start: None, at_end: None };
-        for start_deg in [1.0, 13.4, 20.0, 31.0, 50.0, 89.0] {
-            let fraction = mesh.fraction_at_deg(start_deg);
-            let [before, behind] = whole.cut_where_a_tooth_comes_to_the_relief(Some(fraction)).collect::<Vec<_>>()[..]
-            else {
-                panic!("{start_deg} deg: no cut at {fraction}")
-            };
-            assert_eq!((before.start, before.end, behind.start, behind.end), (0.0, fraction, fraction, 1.0));
-            let off_deg = |place| (before.position(&mesh, place, fraction).from_lobe_deg() - start_deg).abs();
-            assert!((1..=7).any(|place| off_deg(place) < 1e-12), "{start_deg} deg: cut at {fraction}");
-        }
-    }
-
-    /// The secants on both sides of a parabola's interval meet in its middle.
-    #[test]
-    fn suspects_change_between_moments_at_interval_middle() {
-        let judge = Judge {
-            best: [1.0; QUANTITIES],
-            relative: 1e-6,
-            nearest: 1e-9,
-            is_late: false,
-            is_linear: false,
-            lines: None,
-            is_sought: [true; QUANTITIES],
-        };
-        for step in 0..1000 {
-            let (summit, sign) = (0.001 * f64::from(step), if step % 2 == 0 { 1.0 } else { -1.0 });
-            // It is above zero over half of an interval.
-            let half = 0.25 / 16.0;
-            let mut seen = seen_of_a_tooth(|x| sign * (half * half - (x - summit) * (x - summit)));
-            let beside = (1..17).find(|&at| seen.fractions[at] > summit).unwrap_or(16);
-            let interval = [seen.fractions[beside - 1], seen.fractions[beside]];
-            if interval.iter().all(|end| (end - summit).abs() > half) {
-                let is_halfway = |place: f64| (place - interval[0].midpoint(interval[1])).abs() < 1e-9;
-                let place = seen.suspected_change(beside - 1).expect("it changes within the interval");
-                assert!(is_halfway(place), "{place} of {interval:?}");
-                judge.close_in_on_changes(&mut seen, 0);
-                assert!(seen.wanted.iter().any(|&place| is_halfway(place)), "{:?} for {interval:?}", seen.wanted);
-            }
-        }
     }
 
     #[test]

@@ -118,7 +118,7 @@ pub(crate) struct Contacts {
     /// Inner and outer radius of the carrier, where its slots begin and end.
     carrier_radii_mm: [f64; 2],
     modulus_mpa: PerContact<f64>,
-    hertz: PerContact<HertzLine>,
+    pub(crate) hertz: PerContact<HertzLine>,
     pub(crate) law: PerContact<Term>,
     pub(crate) series_compliance_mm_per_n: PerContact<f64>,
 }
@@ -181,11 +181,6 @@ impl Contacts {
             law: laws,
             series_compliance_mm_per_n: *series_compliance_mm_per_n,
         })
-    }
-
-    /// Returns Hertz's line law at a contact, for column-wise evaluation.
-    pub(crate) const fn hertz(&self, contact: Contact) -> &HertzLine {
-        self.hertz.get(contact)
     }
 
     /// Returns true if the approach at each contact is proportional to its force, the same at every place.

@@ -150,11 +150,11 @@ impl Deviating {
 impl GapColumns {
     /// Returns the gaps of a drive under a load; none if there are no gaps.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
-        let gaps = loaded.gaps();
+        let gaps = &loaded.gaps;
         if gaps.is_nil() {
             None
         } else if gaps.are_uniform() {
-            Some(Self::Uniform { gap_mm: *gaps.clearance_mm(), weights: Weights::new(loaded) })
+            Some(Self::Uniform { gap_mm: gaps.clearance_mm, weights: Weights::new(loaded) })
         } else {
             Some(Self::Unlike(Box::new(UnlikeGaps::new(loaded, gaps))))
         }
@@ -234,8 +234,8 @@ fn close_alike(gap_mm: &PerContact<f64>, weights: &Weights, teeth: &Teeth<'_>, c
 impl UnlikeGaps {
     fn new(loaded: &LoadedDrive<'_>, gaps: &Gaps<'_>) -> Self {
         let drive = loaded.drive();
-        let (modification, clearance_mm) = (*gaps.modification(), *gaps.clearance_mm());
-        let deviating = gaps.deviations().map(|deviations| Deviating::new(loaded, deviations));
+        let (modification, clearance_mm) = (gaps.modification, gaps.clearance_mm);
+        let deviating = gaps.deviations.map(|deviations| Deviating::new(loaded, deviations));
         let relief = modification.ring_tip_relief.map(|TipRelief { amount_um, start_deg, power }| Relief {
             amount_mm: MM_PER_UM * amount_um,
             start_rad: start_deg.to_radians(),

@@ -16,7 +16,7 @@ use crate::sweep::columns::{TorqueBalance, TorqueCapacity, worse};
 
 impl Limit {
     pub(super) fn capacity(&self, loaded: &LoadedDrive<'_>, input_angle_deg: f64) -> TorqueCapacity {
-        let input_torque_nm = 1e-3 * (loaded.zones() * self.torque_nmm);
+        let input_torque_nm = 1e-3 * (loaded.zones * self.torque_nmm);
         let output_torque_nm = input_torque_nm * loaded.drive().teeth_per_wave();
         let limited_by = self.contact.into();
         TorqueCapacity { input_torque_nm, output_torque_nm, limited_by, turns_past_teeth: false, input_angle_deg }
@@ -29,7 +29,7 @@ impl Kernel {
     pub(super) fn prepare<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
         let Law::Sharing(sharing) = &self.law else { return true };
         let (teeth, work, gap_work, _) = self.teeth_of(count, tile);
-        sharing.prepare::<V>(loaded.input_torque_nmm() / loaded.zones(), &teeth, work);
+        sharing.prepare::<V>(loaded.input_torque_nmm() / loaded.zones, &teeth, work);
         self.gaps.as_ref().is_none_or(|gaps| gaps.prepare(&teeth, gap_work, work.closing))
     }
 
@@ -73,7 +73,7 @@ impl Kernel {
     #[inline(always)]
     fn scale(loaded: &LoadedDrive<'_>, teeth: usize, tile: &mut Tile<'_>) {
         let rows = tile.sum_torques::<true>(teeth);
-        let (input_nmm, zones) = (loaded.input_torque_nmm(), loaded.zones());
+        let (input_nmm, zones) = (loaded.input_torque_nmm(), loaded.zones);
         let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
         let (cam, ring, carrier) = (&mut cam[..rows], &mut ring[..rows], &mut carrier[..rows]);
         let (rotation_rad, rotation_root) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_rotation_root[..rows]);
@@ -124,7 +124,7 @@ impl Kernel {
     #[inline(always)]
     fn share<V: Simd>(&self, sharing: &Sharing, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
         let (teeth, work, _, mut shared) = self.teeth_of(count, tile);
-        sharing.share::<V>(loaded.input_torque_nmm() / loaded.zones(), &teeth, work, &mut shared)
+        sharing.share::<V>(loaded.input_torque_nmm() / loaded.zones, &teeth, work, &mut shared)
     }
 
     /// Returns the limit of the teeth after load sharing; none if it needs the plain path.
@@ -144,7 +144,7 @@ impl Kernel {
     /// Computes torques, stiffness and the number of carrying teeth after load sharing.
     #[inline(always)]
     fn scale_shared<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) {
-        let zones = loaded.zones();
+        let zones = loaded.zones;
         let len = tile.count.next_multiple_of(LANES);
         let (scale, root) = (&tile.scale[..len], &mut tile.scale_root[..len]);
         let are_balls = matches!(self.pressures, Pressures::Ellipses(_));

@@ -170,7 +170,7 @@ impl<'a> FastLook<'a> {
                     stresses[i] = stress[i] * root[i];
                 }
             }
-            let per_capacity = if limit.is_some() { 1.0 / (loaded.zones() * tile.work.limits_nmm()[row]) } else { 0.0 };
+            let per_capacity = if limit.is_some() { 1.0 / (loaded.zones * tile.work.limits_nmm()[row]) } else { 0.0 };
             let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
             values[LOADS * teeth..].copy_from_slice(&totals);
         }

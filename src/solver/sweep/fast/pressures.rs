@@ -28,9 +28,9 @@ pub(super) enum Pressures {
 impl Pressures {
     /// Builds the model; none if its curves need too many terms.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
-        if let Some(ball) = loaded.ball(Contact::WaveGenerator) {
+        if let Some(ball) = loaded.contacts.ball(Contact::WaveGenerator) {
             Ellipses::new(loaded, &ball).map(Self::Ellipses)
-        } else if let Some(flat) = loaded.flat() {
+        } else if let Some(flat) = loaded.contacts.flat() {
             FlatColumns::new(loaded, flat).map(Self::Flat)
         } else {
             Some(Self::Lines)
@@ -40,7 +40,7 @@ impl Pressures {
     /// Returns `E*/(π L1)` of each contact; 1 for balls, whose curvatures are needed first.
     pub(super) fn hertz(&self, loaded: &LoadedDrive<'_>) -> PerContact<f64> {
         PerContact::of(|contact| match self {
-            Self::Lines | Self::Flat(_) => loaded.hertz(contact).modulus_per_width_mpa_per_mm(),
+            Self::Lines | Self::Flat(_) => loaded.contacts.hertz.get(contact).modulus_per_width_mpa_per_mm(),
             Self::Ellipses(_) => 1.0,
         })
     }
@@ -121,10 +121,10 @@ impl Ellipses {
     fn new(loaded: &LoadedDrive<'_>, on_cam: &BallContact) -> Option<Self> {
         let places = along_flank(loaded)?;
         let curvatures = |contact| places.iter().map(move |(_, curvatures)| *curvatures.get(contact));
-        let on_wall = loaded.ball(Contact::Carrier)?.at(places.first()?.1.carrier).ok()?;
+        let on_wall = loaded.contacts.ball(Contact::Carrier)?.at(places.first()?.1.carrier).ok()?;
         Some(Self {
             wave_generator: EllipseCurves::new(on_cam, curvatures(Contact::WaveGenerator))?,
-            ring: EllipseCurves::new(&loaded.ball(Contact::Ring)?, curvatures(Contact::Ring))?,
+            ring: EllipseCurves::new(&loaded.contacts.ball(Contact::Ring)?, curvatures(Contact::Ring))?,
             carrier: [on_wall.coefficient(), on_wall.stress_mpa(1.0)],
         })
     }

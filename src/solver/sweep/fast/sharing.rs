@@ -339,7 +339,7 @@ impl Sharing {
     /// only its series compliance.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
         let contacts = loaded.contacts_in_columns()?;
-        let (weights, has_gaps) = (Weights::new(loaded), !loaded.gaps().is_nil());
+        let (weights, has_gaps) = (Weights::new(loaded), !loaded.gaps.is_nil());
         let series = contacts.series_compliance_mm_per_n;
         let is_alone = series.iter().all(|(_, &compliance)| compliance == 0.0);
         let PerContact { wave_generator, ring, carrier } = contacts.law;

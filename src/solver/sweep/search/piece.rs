@@ -33,7 +33,7 @@ impl Piece {
     pub(crate) fn of(loaded: &LoadedDrive<'_>, lap: u64) -> impl Iterator<Item = Self> + use<> {
         let mesh = *loaded.mesh();
         let relieved_fraction =
-            loaded.gaps().modification().ring_tip_relief.map(|relief| mesh.fraction_at_deg(relief.start_deg));
+            loaded.gaps.modification.ring_tip_relief.map(|relief| mesh.fraction_at_deg(relief.start_deg));
         let (places, entry) = (mesh.whole_spacings(), mesh.entry_fraction());
         let is_whole = mesh.spacings_are_whole();
         let entering = |place| Some(AtPlace { place, position: mesh.last_position() });
@@ -43,7 +43,8 @@ impl Piece {
             Self { lap, start: entry, end: 1.0, places: places + 1, at_start: entering(places + 1), at_end: None };
         let pieces = std::iter::once(first).chain((!is_whole).then_some(rest));
         let pieces = pieces.flat_map(move |piece| piece.cut_where_a_tooth_comes_to_the_flank(&mesh));
-        pieces.flat_map(move |piece| piece.cut_where_a_tooth_comes_to_the_relief(relieved_fraction))
+        // Where a tooth reaches the tip relief, its gap has a kink for power 1, otherwise it grows smoothly.
+        pieces.flat_map(move |piece| piece.cut_at(relieved_fraction, [None, None]))
     }
 
     /// Cuts the piece where a tooth reaches the flank: loads have a kink there, and the ring's stress begins.
@@ -53,15 +54,6 @@ impl Piece {
         let on_flank = Some(AtPlace { place, position: limit.position });
         let before = Some(AtPlace { place, position: TipCorner::last_before_flank(&limit) });
         self.cut_at(mesh.lists_teeth_before_flank().then_some(fraction), [before, on_flank])
-    }
-
-    /// Cuts the piece where a tooth reaches the tip relief. Its gap has a kink there for power 1, otherwise it grows
-    /// smoothly.
-    pub(super) fn cut_where_a_tooth_comes_to_the_relief(
-        self,
-        fraction: Option<f64>,
-    ) -> impl Iterator<Item = Self> + use<> {
-        self.cut_at(fraction, [None, None])
     }
 
     /// Returns the pieces before and after a fraction within, with the exactly known tooth at the cut.

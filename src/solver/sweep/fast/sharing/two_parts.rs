@@ -113,7 +113,7 @@ impl Logarithm {
             match contact {
                 // σ² = F Σ E*/(π L1), F = 1 at the wave generator and F_K/F_H at the ring.
                 Contact::WaveGenerator | Contact::Ring => {
-                    of_curvature / loaded.hertz(contact).modulus_per_width_mpa_per_mm()
+                    of_curvature / loaded.contacts.hertz.get(contact).modulus_per_width_mpa_per_mm()
                 }
                 Contact::Carrier if growth_mm_per_n > 0.0 => of_curvature / loaded.drive().parameters().tooth_radius_mm,
                 Contact::Carrier => NEVER_TOO_WIDE_N,
