@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use toothwave_solver::backing::{Backings, Shares};
 use toothwave_solver::drive::Draft;
-use toothwave_solver::mesh::{Mesh, Samples};
+use toothwave_solver::mesh::Samples;
 use toothwave_solver::model_error::{self, Beyond, ModelError};
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
@@ -115,8 +115,8 @@ impl Question for Accuracy {
     type Checked = CheckedAccuracy;
     type Answer = AccuracyAnswer;
 
-    fn name(&self) -> &'static str {
-        "accuracy"
+    fn name(&self) -> String {
+        "accuracy".into()
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
@@ -131,20 +131,16 @@ impl Question for Accuracy {
         let load = checked_load(design, &draft, &mut violations)?;
         match (draft.drive(), load, design.requested_error()) {
             (Some(drive), Some(load), Ok(requested_error)) if violations.is_empty() => {
-                let (deviations, max_states) = (Deviations::from(&design.deviations), limits.max_searched_states);
-                let backings = Backings::of(&drive, &draft, &design.parts_parameters()?, design.support());
                 let has_pointed_tips = model_error::has_pointed_tips(&drive);
-                let model = design.complete_model(has_pointed_tips);
-                let refinements = design.refinements_by_virtual_work(has_pointed_tips);
                 Ok(CheckedAccuracy {
+                    model: design.complete_model(has_pointed_tips),
+                    refinements: design.refinements_by_virtual_work(has_pointed_tips),
+                    backings: Backings::of(&drive, &draft, &design.parts_parameters()?, design.support()),
                     drive,
-                    model,
-                    refinements,
                     load,
-                    deviations,
-                    backings,
+                    deviations: design.deviations.clone(),
                     requested_error,
-                    max_states,
+                    max_states: limits.max_searched_states,
                 })
             }
             (_, _, requested_error) => {
@@ -175,12 +171,8 @@ impl Question for Accuracy {
         for model in models(drive, &parameters, checked.refinements) {
             let (compatibility, law) = (model.compatibility, model.law.name());
             match Model::new(checked, &model, &own.peaks, stop) {
-                Ok(Some(model)) => model.measure(&mut ways, stop)?,
-                // This form of compatibility would turn a gap into load.
-                Ok(None) => {
-                    unavailable.push(UnavailableAnswer { compatibility, law, code: NoAnswerCode::ImpossibleDesign });
-                }
-                Err(SolveError::Stopped) => return Err(SolveError::Stopped.into()),
+                Ok(model) => model.measure(&mut ways, stop)?,
+                Err(SolveError::Stopped) => return Err(NoAnswer::stopped()),
                 Err(error) => {
                     let code = NoAnswer::from(error).code;
                     unavailable.push(UnavailableAnswer { compatibility, law, code });
@@ -203,13 +195,6 @@ impl Question for Accuracy {
             unavailable,
         })
     }
-}
-
-/// Returns the numbers of samples within the limit on states.
-fn admitted_samples(mesh: Mesh, max_states: u64) -> impl Iterator<Item = Samples> {
-    // All of them are within the range.
-    let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
-    samples.filter(move |&samples| mesh.state_count(samples) <= max_states)
 }
 
 /// Returns the design's own model, then every other form of compatibility with each law that is possible for it and the
@@ -274,26 +259,30 @@ struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// Makes the model, or none if its clearances are invalid.
     fn new(
         checked: &'a CheckedAccuracy,
         parameters: &LoadParameters,
         own_peaks: &PerContact<ContactPeaks>,
         stop: &dyn Stop,
-    ) -> Result<Option<Self>, SolveError> {
-        let Ok(load) = LoadCase::new(parameters) else { return Ok(None) };
-        if !parameters.clearance_violations(&Draft::new(checked.drive.parameters())?)?.is_empty() {
-            return Ok(None);
+    ) -> Result<Self, SolveError> {
+        let load = LoadCase::new(parameters).map_err(SolveError::Impossible)?;
+        // Some forms of compatibility would turn a gap into load.
+        let violations = parameters.clearance_violations(&Draft::new(checked.drive.parameters())?)?;
+        if !violations.is_empty() {
+            return Err(SolveError::Impossible(violations));
         }
         let reference = Converged::new(checked, &load, stop)?;
         let difference = difference(&reference.peaks, own_peaks);
-        Ok(Some(Self { checked, load, reference, difference }))
+        Ok(Self { checked, load, reference, difference })
     }
 
     /// Measures every number of samples and every tolerance within the limit on states.
     fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &dyn Stop) -> Result<(), SolveError> {
         let &CheckedAccuracy { ref drive, ref deviations, max_states, .. } = self.checked;
-        for samples in admitted_samples(self.load.mesh(drive, deviations), max_states) {
+        let mesh = self.load.mesh(drive, deviations);
+        // All of them are within the range.
+        let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
+        for samples in samples.filter(|&samples| mesh.state_count(samples) <= max_states) {
             ways.push(self.way(Points::Samples(samples), stop)?);
         }
         for tolerance in TOLERANCES.into_iter().filter_map(|value| Tolerance::new(value, max_states).ok()) {

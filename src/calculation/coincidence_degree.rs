@@ -46,8 +46,8 @@ impl Question for CoincidenceDegree {
     type Checked = Drive;
     type Answer = CoincidenceDegreeAnswer;
 
-    fn name(&self) -> &'static str {
-        "coincidence-degree"
+    fn name(&self) -> String {
+        "coincidence-degree".into()
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {

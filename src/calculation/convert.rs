@@ -2,10 +2,9 @@
 
 use serde::{Serialize, Serializer};
 use toothwave_solver::drive::Draft;
-use toothwave_solver::{Contact, SolveError, model_error};
+use toothwave_solver::{Contact, model_error};
 
 use crate::design::{DEPRECATED_SWITCHES, Design, RefinementsDocument};
-use crate::field::FieldCode;
 use crate::json::{self, Fault, Tree};
 use crate::no_answer::NoAnswer;
 
@@ -34,7 +33,7 @@ fn convert_design(tree: &mut Tree) -> Result<(), NoAnswer> {
     design.require_one_choice_of_refinements()?;
     move_clearance(tree);
     if design.deprecated_fields().iter().any(|field| DEPRECATED_SWITCHES.contains(field)) {
-        let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
+        let draft = Draft::new(&design.drive_parameters())?;
         let drive = draft.drive().ok_or_else(|| NoAnswer::impossible(&design.as_written(draft.violations())))?;
         let has_pointed_tips = model_error::has_pointed_tips(&drive);
         for path in DEPRECATED_SWITCHES.into_iter().filter_map(json::path) {
@@ -94,7 +93,7 @@ pub fn converted_pointer(pointer: &str) -> Result<String, Fault> {
 
 fn no_replacement(switch: &str) -> Fault {
     let detail = "what takes its place depends on the geometry, which may vary; choose `model.refinements` instead";
-    Fault { pointer: switch.into(), code: FieldCode::ConflictingFields, detail: detail.into() }
+    Fault::conflict(switch, detail)
 }
 
 struct Written<'a>(&'a Tree);

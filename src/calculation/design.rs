@@ -5,14 +5,14 @@
 use serde::{Deserialize, Serialize};
 use toothwave_solver::backing::Support;
 use toothwave_solver::drawing::DrawingParameters;
-use toothwave_solver::fingers::{FingerParameters, LoadCycle};
+use toothwave_solver::fingers::{FingerParameters, LoadCycle, Strength};
 use toothwave_solver::losses::duty::LossParameters;
 use toothwave_solver::parts::{CarrierRadii, PartsParameters};
 use toothwave_solver::profile::ProfileParameters;
 use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::{OfDutyPoint, SHARES_TOLERANCE};
 use toothwave_solver::{
-    DriveParameters, LoadCase, LoadParameters, Materials, Modification, Parameter, Torque, Violation,
+    Deviations, DriveParameters, LoadCase, LoadParameters, Materials, Modification, Parameter, Torque, Violation,
 };
 use utoipa::ToSchema;
 
@@ -34,7 +34,6 @@ mod strength;
 
 pub use asked::*;
 pub use contact_law::*;
-pub use deviations::*;
 pub use drive::*;
 pub use friction::*;
 pub use load::*;
@@ -79,7 +78,7 @@ pub struct Design {
     pub modification: Modification,
     /// Deviations of individual items of the parts. A positive value opens a gap. Default: none.
     #[serde(default)]
-    pub deviations: DeviationsDocument,
+    pub deviations: Deviations,
     /// Input angles of a sweep.
     #[serde(default)]
     pub sweep: SweepDocument,
@@ -122,16 +121,17 @@ pub struct DutyPoint {
 }
 
 /// Returns the torque if exactly one is given.
-fn one_torque(input_nm: Option<f64>, output_nm: Option<f64>, pointer: String) -> Result<Torque, Fault> {
-    let fault = |code, detail: &str| Fault { pointer, code, detail: detail.into() };
+fn one_torque(input_nm: Option<f64>, output_nm: Option<f64>, pointer: &str) -> Result<Torque, Fault> {
     match (input_nm, output_nm) {
         (Some(torque_nm), None) => Ok(Torque::Input(torque_nm)),
         (None, Some(torque_nm)) => Ok(Torque::Output(torque_nm)),
-        (Some(_), Some(_)) => Err(fault(
-            FieldCode::ConflictingFields,
-            "only one of `input_torque_nm` and `output_torque_nm` may stand here",
-        )),
-        (None, None) => Err(fault(FieldCode::MissingField, "`input_torque_nm` or `output_torque_nm` is required here")),
+        (Some(_), Some(_)) => {
+            Err(Fault::conflict(pointer, "only one of `input_torque_nm` and `output_torque_nm` may stand here"))
+        }
+        (None, None) => {
+            let detail = "`input_torque_nm` or `output_torque_nm` is required here";
+            Err(Fault::at(pointer, FieldCode::MissingField, detail))
+        }
     }
 }
 
@@ -147,13 +147,10 @@ impl Design {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
         }
         let drive = self.drive_parameters();
-        self.deviations.leave_out_zeros(&drive);
+        deviations::leave_out_zeros(&mut self.deviations, &drive);
         self.parts.leave_out_default_supports();
         if let Some(friction) = &mut self.friction {
             friction.leave_out_zero_wear();
-        }
-        if let Some(load) = &mut self.load {
-            load.allowable_stress_mpa = load.allowable_stress_mpa.map(AllowableStressDocument::normalised);
         }
         self
     }
@@ -200,12 +197,12 @@ impl Design {
         self.require_one_choice_of_refinements()?;
         let load = self.load.as_ref().ok_or_else(|| {
             let detail = "forces need a load: give `load` an `input_torque_nm` or an `output_torque_nm`";
-            Fault::of_field(FieldCode::MissingField, "load", detail.into())
+            Fault::at("/load", FieldCode::MissingField, detail)
         })?;
-        let Duty { points, hardest, .. } = self.duty_of(load)?;
+        let Duty { points, hardest, .. } = self.duty()?;
         Ok(LoadParameters {
             torque: points[hardest].torque,
-            allowable_stress_mpa: load.allowable_stress_mpa.map(Into::into),
+            allowable_stress_mpa: load.allowable_stress_mpa.map(|stress_mpa| stress_mpa.0),
             ..self.model_parameters(has_pointed_tips)
         })
     }
@@ -213,6 +210,12 @@ impl Design {
     /// Returns the parameters of the load with the default torque.
     fn model_parameters(&self, has_pointed_tips: bool) -> LoadParameters {
         let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.refinements(has_pointed_tips);
+        let CarrierPartDocument { inner_radius_mm, outer_radius_mm, .. } = self.parts.carrier;
+        let carrier = match self.drive.teeth {
+            TeethDocument::FlatSided(_) => CarrierRadii { inner_mm: inner_radius_mm, outer_mm: outer_radius_mm },
+            // Forces on other teeth do not depend on the carrier's radii.
+            TeethDocument::Cylinder(_) | TeethDocument::Ball(_) => CarrierRadii::default(),
+        };
         LoadParameters {
             materials: self.materials,
             compatibility: self.model.compatibility,
@@ -222,7 +225,7 @@ impl Design {
             wave_generator_moves,
             corner_contact,
             modification: self.modification,
-            carrier: self.carrier_of_flats(),
+            carrier,
             clearance_um: self.clearances_um().gaps(),
             ..LoadParameters::default()
         }
@@ -234,49 +237,31 @@ impl Design {
         found.filter(|violation| violation.code == FieldCode::ConflictingFields).collect()
     }
 
-    /// Returns the given radii of the carrier that supports flat-sided teeth. Forces on other teeth do not depend on
-    /// them.
-    pub fn carrier_of_flats(&self) -> CarrierRadii {
-        let CarrierPartDocument { inner_radius_mm, outer_radius_mm, .. } = self.parts.carrier;
-        match self.drive.teeth {
-            TeethDocument::FlatSided(_) => CarrierRadii { inner_mm: inner_radius_mm, outer_mm: outer_radius_mm },
-            TeethDocument::Cylinder(_) | TeethDocument::Ball(_) => CarrierRadii::default(),
-        }
-    }
-
     /// Returns the points of the duty, or a single one without duty; none without a load.
     pub fn duty(&self) -> Result<Duty, Fault> {
-        self.load.as_ref().map_or_else(|| Ok(Duty::default()), |load| self.duty_of(load))
-    }
-
-    fn duty_of(&self, load: &LoadDocument) -> Result<Duty, Fault> {
-        let fault = |code, pointer: String, detail: &str| Fault { pointer, code, detail: detail.into() };
-        let LoadDocument { input_torque_nm, output_torque_nm, input_speed_rpm, duty, .. } = load;
-        let Some(duty) = duty else {
-            let torque = one_torque(*input_torque_nm, *output_torque_nm, "/load".into())?;
-            let point = DutyPoint { torque, input_speed_rpm: *input_speed_rpm, share_of_time: 1.0 };
+        let Some(load) = &self.load else { return Ok(Duty::default()) };
+        let &LoadDocument { input_torque_nm, output_torque_nm, input_speed_rpm, .. } = load;
+        let Some(duty) = &load.duty else {
+            let torque = one_torque(input_torque_nm, output_torque_nm, "/load")?;
+            let point = DutyPoint { torque, input_speed_rpm, share_of_time: 1.0 };
             return Ok(Duty { points: vec![point], ..Duty::default() });
         };
-        if input_torque_nm.or(*output_torque_nm).or(*input_speed_rpm).is_some() {
+        if input_torque_nm.or(output_torque_nm).or(input_speed_rpm).is_some() {
             let detail = "`duty` has torques and speeds of its own: no other may stand here";
-            return Err(fault(FieldCode::ConflictingFields, "/load".into(), detail));
+            return Err(Fault::conflict("/load", detail));
         }
         if self.sweep.tolerance.is_some() {
             let detail = "a duty adds wear place by place, and its points have to be swept over the same input angles: give `samples`";
-            return Err(fault(FieldCode::ConflictingFields, "/sweep/tolerance".into(), detail));
+            return Err(Fault::conflict("/sweep/tolerance", detail));
         }
-        let points: Result<Vec<_>, _> = duty
-            .iter()
-            .enumerate()
-            .map(|(at, point)| {
-                let torque = one_torque(point.input_torque_nm, point.output_torque_nm, format!("/load/duty/{at}"))?;
-                let (input_speed_rpm, share_of_time) = (Some(point.input_speed_rpm), point.share_of_time);
-                Ok(DutyPoint { torque, input_speed_rpm, share_of_time })
-            })
-            .collect();
-        let points = points?;
+        let mut points = Vec::new();
+        for (at, point) in duty.iter().enumerate() {
+            let torque = one_torque(point.input_torque_nm, point.output_torque_nm, &format!("/load/duty/{at}"))?;
+            let (input_speed_rpm, share_of_time) = (Some(point.input_speed_rpm), point.share_of_time);
+            points.push(DutyPoint { torque, input_speed_rpm, share_of_time });
+        }
         if points.is_empty() {
-            return Err(fault(FieldCode::OutOfRange, "/load/duty".into(), "a duty has one point or more"));
+            return Err(Fault::at("/load/duty", FieldCode::OutOfRange, "a duty has one point or more"));
         }
         // All forces grow with the torque, so the point with the largest torque governs.
         let drive = self.drive_parameters();
@@ -343,8 +328,7 @@ impl Design {
         let SweepDocument { samples, tolerance, .. } = self.sweep;
         match (samples, tolerance) {
             (Some(_), Some(_)) => {
-                let detail = "at most one of `samples` and `tolerance` is wanted here";
-                Err(Fault::of_field(FieldCode::ConflictingFields, "sweep", detail.into()))
+                Err(Fault::conflict("/sweep", "at most one of `samples` and `tolerance` is wanted here"))
             }
             (None, Some(tolerance)) => Ok(Points::tolerance(tolerance, max_states)),
             (samples, None) => {
@@ -388,18 +372,23 @@ impl Design {
 
     /// Returns the parameters of the carrier's fingers.
     pub fn finger_parameters(&self) -> Result<FingerParameters, Vec<Violation>> {
-        let CarrierPartDocument { fingers, finger_fillet_radius_mm, strength, .. } = &self.parts.carrier;
-        let fillet = finger_fillet_radius_mm.map(|radius_mm| (Parameter::FingerFilletRadius, radius_mm));
-        let numbers = strength.iter().flat_map(StrengthDocument::parameters);
-        let violations: Vec<_> =
-            fillet.into_iter().chain(numbers).filter_map(|(parameter, value)| parameter.check(value)).collect();
+        let CarrierPartDocument { fingers, finger_fillet_radius_mm: fillet_radius_mm, strength, .. } =
+            self.parts.carrier;
+        let strength = strength.map(StrengthDocument::numbers);
+        let mut violations: Vec<_> =
+            fillet_radius_mm.and_then(|mm| Parameter::FingerFilletRadius.check(mm)).into_iter().collect();
+        if let Some(Strength { yield_mpa, tensile_mpa, endurance_mpa, .. }) = strength {
+            violations.extend(Parameter::YieldStrength.check(yield_mpa));
+            violations.extend(Parameter::TensileStrength.check(tensile_mpa));
+            violations.extend(Parameter::EnduranceLimit.check(endurance_mpa));
+        }
         if !violations.is_empty() {
             return Err(violations);
         }
         Ok(FingerParameters {
             fingers: fingers.unwrap_or_default(),
-            fillet_radius_mm: *finger_fillet_radius_mm,
-            strength: strength.map(StrengthDocument::numbers),
+            fillet_radius_mm,
+            strength,
             cycle: self.load.as_ref().map_or_else(LoadCycle::default, |load| load.cycle),
             friction_coefficient: self.friction.as_ref().map_or(0.0, |friction| friction.carrier.coefficient),
         })

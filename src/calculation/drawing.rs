@@ -3,15 +3,16 @@
 use std::borrow::Cow;
 
 use serde::Serialize;
+use toothwave_solver::Stop;
 use toothwave_solver::drawing as solver;
 use toothwave_solver::drive::{Draft, DriveError};
-use toothwave_solver::{SolveError, Stop};
 
 use crate::design::Design;
 use crate::drawing::answer::{BodyAnswer, DrawingAnswer, DrawnPart, EdgeAnswer, OutlineAnswer};
 use crate::drawing::preset::Preset;
 use crate::findings::{Causes, FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};
+use crate::json::word;
 use crate::key::Key;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question};
@@ -59,19 +60,9 @@ impl Question for Drawing {
     type Checked = CheckedDrawing;
     type Answer = DrawingAnswer;
 
-    fn name(&self) -> &'static str {
-        match (self.part, self.preset) {
-            (DrawnPart::Ring, Preset::Document) => "drawings/ring",
-            (DrawnPart::WaveGenerator, Preset::Document) => "drawings/wave-generator",
-            (DrawnPart::Carrier, Preset::Document) => "drawings/carrier",
-            (DrawnPart::Tooth, Preset::Document) => "drawings/tooth",
-            (DrawnPart::Assembly, Preset::Document) => "drawings/assembly",
-            (DrawnPart::Ring, Preset::Printing) => "drawings/ring, printing",
-            (DrawnPart::WaveGenerator, Preset::Printing) => "drawings/wave-generator, printing",
-            (DrawnPart::Carrier, Preset::Printing) => "drawings/carrier, printing",
-            (DrawnPart::Tooth, Preset::Printing) => "drawings/tooth, printing",
-            (DrawnPart::Assembly, Preset::Printing) => "drawings/assembly, printing",
-        }
+    fn name(&self) -> String {
+        let preset = if self.preset == Preset::Printing { ", printing" } else { "" };
+        format!("drawings/{}{preset}", word(&self.part))
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
@@ -80,16 +71,19 @@ impl Question for Drawing {
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedDrawing, NoAnswer> {
-        let drawn = self.as_drawn(design);
+        let drawn = match self.preset {
+            Preset::Document => Cow::Borrowed(design),
+            Preset::Printing => Cow::Owned(preset::printed(design)),
+        };
         let (subject, design) = (self.part, &*drawn);
         let of_design = design.drawn_in_key();
         let parameters = design.drawing_parameters(limits.max_profile_points);
-        let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
+        let draft = Draft::new(&design.drive_parameters())?;
         let parts = design.parts_parameters()?;
         let drawing = solver::Drawing::new(&draft, subject.subject(), &parts, &parameters);
         let drawing = drawing.map_err(|error| match error {
             DriveError::Impossible(violations) => NoAnswer::impossible(&design.as_written(&violations)),
-            error @ DriveError::NotConverged(_) => error.into(),
+            DriveError::NotConverged(error) => error.into(),
         })?;
         Ok(CheckedDrawing {
             drawing,
@@ -118,7 +112,7 @@ impl Question for Drawing {
 
     fn answer(checked: &CheckedDrawing, stop: &dyn Stop) -> Result<DrawingAnswer, NoAnswer> {
         let bodies = checked.drawing.bodies(stop)?;
-        let of_parts = checked.drawing.findings().map_err(SolveError::from)?;
+        let of_parts = checked.drawing.findings()?;
         let drive = checked.drawing.drive();
         let mut findings = drive_findings(drive)?;
         findings.extend(of_parts.iter().map(|finding| FindingAnswer::new(finding, drive, checked.causes)));
@@ -133,16 +127,6 @@ impl Question for Drawing {
             bodies: bodies.into_iter().map(|body| BodyAnswer::new(body, checked.drawing.drive())).collect(),
             findings,
         })
-    }
-}
-
-impl Drawing {
-    /// The design with the preset's clearances.
-    fn as_drawn<'a>(&self, design: &'a Design) -> Cow<'a, Design> {
-        match self.preset {
-            Preset::Document => Cow::Borrowed(design),
-            Preset::Printing => Cow::Owned(preset::printed(design)),
-        }
     }
 }
 

@@ -7,7 +7,7 @@ use toothwave_solver::findings;
 pub use toothwave_solver::findings::{FindingCode, Severity};
 use toothwave_solver::fingers::Fingers;
 use toothwave_solver::losses::MEASURED_TO;
-use toothwave_solver::{Contact, Drive, Finding, Parameter, SolveError, ToothShape, WaveGenerator};
+use toothwave_solver::{Contact, Drive, Finding, Parameter, ToothShape, WaveGenerator};
 use utoipa::ToSchema;
 
 use crate::design::{DEPRECATED_CLEARANCE, Design};
@@ -345,7 +345,7 @@ impl FindingAnswer {
 
 /// Returns the findings about a drive, ready for JSON.
 pub(crate) fn drive_findings(drive: &Drive) -> Result<Vec<FindingAnswer>, NoAnswer> {
-    let findings = findings::of_drive(drive).map_err(SolveError::from)?;
+    let findings = findings::of_drive(drive)?;
     Ok(findings.iter().map(|finding| FindingAnswer::new(finding, drive, Causes::default())).collect())
 }
 

@@ -7,7 +7,7 @@ use toothwave_solver::drawing::{self, Edge};
 use toothwave_solver::losses::{Fixed, Mechanism};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::profile::{self, Polyline, ProfileParameters};
-use toothwave_solver::{Drive, SolveError, Stop};
+use toothwave_solver::{Drive, Stop};
 use utoipa::ToSchema;
 
 use crate::design::Design;
@@ -205,21 +205,6 @@ impl From<&Drive> for UndercutAnswer {
     }
 }
 
-impl SlotWall {
-    /// The ring pushes a tooth in the input's direction for s = +1, and against it for s = -1 (docs/explanation/theory.md section
-    /// 5).
-    fn loaded(drive: &Drive) -> Self {
-        if drive.sense() > 0.0 { Self::Leading } else { Self::Trailing }
-    }
-}
-
-impl FingerAnswer {
-    fn new(drive: &Drive) -> Option<Self> {
-        let corners: Vec<_> = drawing::widest_finger(drive)?.iter().map(Edge::start).collect();
-        Some(Self { corners: (&corners).into() })
-    }
-}
-
 impl From<&Drive> for EngagementAnswer {
     fn from(drive: &Drive) -> Self {
         Self { start_deg: drive.flank_limit().position.from_lobe_deg(), end_deg: 0.0 }
@@ -237,8 +222,8 @@ impl Question for Geometry {
     type Checked = (Drive, ProfileParameters);
     type Answer = GeometryAnswer;
 
-    fn name(&self) -> &'static str {
-        "geometry"
+    fn name(&self) -> String {
+        "geometry".into()
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
@@ -266,10 +251,14 @@ impl Question for Geometry {
         let profiles = profile::profiles(drive, profile, stop)?;
         let (p, cam_outer_mm) = (drive.parameters(), drive.cam_outer_radius_mm());
         let flank = drive.flank();
-        let steepest = drive.steepest_engaged().map_err(SolveError::from)?;
-        let innermost = flank.locus().at(drive.flank_limit().position).map_err(SolveError::from)?;
-        let center_distance_mm = drive.least_center_distance_mm().map_err(SolveError::from)?;
+        let steepest = drive.steepest_engaged()?;
+        let innermost = flank.locus().at(drive.flank_limit().position)?;
+        let center_distance_mm = drive.least_center_distance_mm()?;
         let tip_radius_mm = drive.tip_radius_mm();
+        let finger = drawing::widest_finger(drive).map(|edges| {
+            let corners: Vec<_> = edges.iter().map(Edge::start).collect();
+            FingerAnswer { corners: (&corners).into() }
+        });
         let answer = GeometryAnswer {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,
@@ -297,8 +286,10 @@ impl Question for Geometry {
                 slot_wall_mm: drive.slot_wall_mm(),
                 tooth_center_clearance_inner_mm: innermost.center_radius_mm - cam_outer_mm,
                 tooth_center_clearance_outer_mm: tip_radius_mm - (cam_outer_mm + p.tooth_radius_mm),
-                loaded_wall: SlotWall::loaded(drive),
-                finger: FingerAnswer::new(drive),
+                // The ring pushes a tooth in the input's direction for s = +1, and against it for s = -1
+                // (docs/explanation/theory.md section 5).
+                loaded_wall: if drive.sense() > 0.0 { SlotWall::Leading } else { SlotWall::Trailing },
+                finger,
             },
             teeth: TeethAnswer { gap_min_mm: center_distance_mm - 2.0 * p.tooth_radius_mm },
             tooth_center_path: (&profiles.tooth_center_path).into(),

@@ -57,7 +57,7 @@ pub fn tree(text: &[u8]) -> Result<Tree, NoAnswer> {
                     serde_path_to_error::Segment::Seq { index } => Some(format!("/{index}")),
                     _ => None,
                 });
-                Fault { pointer: pointer.collect(), code, detail: detail.into() }.into()
+                Fault::at(&pointer.collect::<String>(), code, detail).into()
             }
             (_, Err(error)) => malformed(format!("{error}. Send one complete JSON document")),
             (None, Ok(_)) => malformed(error.inner().to_string()),

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use toothwave_solver::drive::DriveError;
+use toothwave_solver::root::NotConverged;
 use toothwave_solver::{SolveError, Violation};
 use utoipa::ToSchema;
 
@@ -115,62 +116,60 @@ impl From<DriveError> for NoAnswer {
     fn from(error: DriveError) -> Self {
         match error {
             DriveError::Impossible(violations) => Self::impossible(&violations),
-            DriveError::NotConverged(error) => Self::internal(error),
+            DriveError::NotConverged(error) => error.into(),
         }
+    }
+}
+
+impl From<NotConverged> for NoAnswer {
+    fn from(error: NotConverged) -> Self {
+        Self::internal(error)
     }
 }
 
 impl From<SolveError> for NoAnswer {
     fn from(error: SolveError) -> Self {
+        use NoAnswerCode as Code;
         let detail = error.to_string();
-        match error {
-            SolveError::NoToothInMesh { .. } => Self::new(
-                NoAnswerCode::NoToothInMesh,
-                format!("{detail}. Install more teeth, or make the flank longer: use less undercut or a smaller bore"),
+        let (code, advice) = match error {
+            SolveError::NoToothInMesh { .. } => (
+                Code::NoToothInMesh,
+                ". Install more teeth, or make the flank longer: use less undercut or a smaller bore",
             ),
-            SolveError::ComplianceNotPositive { .. } => Self::new(
-                NoAnswerCode::ComplianceNotPositive,
-                format!("{detail}. Use `virtual_work`, or stiffnesses that differ less"),
-            ),
-            SolveError::Impossible(violations) => Self::impossible(&violations),
-            SolveError::Interference { .. } => Self::new(
-                NoAnswerCode::Interference,
-                format!(
-                    "{detail}: teeth interfere with a part there. Use a larger `parts.*.clearance_um`, or smaller `modification` and `deviations`"
-                ),
-            ),
-            SolveError::JohnsonBeyondHalfWidth { is_of_capacity: false, .. } => {
-                Self::new(NoAnswerCode::ImpossibleDesign, detail)
+            SolveError::NoLeverArm => (Code::NoToothInMesh, ""),
+            SolveError::ComplianceNotPositive { .. } => {
+                (Code::ComplianceNotPositive, ". Use `virtual_work`, or stiffnesses that differ less")
             }
-            SolveError::JohnsonBeyondHalfWidth { is_of_capacity: true, .. } => Self::new(
-                NoAnswerCode::ImpossibleDesign,
-                format!("{detail}. Use a smaller `load.allowable_stress_mpa`, or leave it out"),
+            SolveError::Interference { .. } => (
+                Code::Interference,
+                ": teeth interfere with a part there. Use a larger `parts.*.clearance_um`, or smaller `modification` and `deviations`",
             ),
-            SolveError::FlatOffCarrier { .. } => Self::new(
-                NoAnswerCode::ImpossibleDesign,
-                format!("{detail}. Use longer flats, or a wider carrier (`parts.carrier`)"),
-            ),
-            SolveError::NoLeverArm => Self::new(NoAnswerCode::NoToothInMesh, detail),
-            SolveError::TurnedPastTeeth => Self::new(
-                NoAnswerCode::ImpossibleDesign,
-                format!(
-                    "{detail}. Use a lower torque or smaller gaps, or remove `wave_generator_moves` from `model.refinements`"
-                ),
+            SolveError::JohnsonBeyondHalfWidth { is_of_capacity: false, .. } => (Code::ImpossibleDesign, ""),
+            SolveError::JohnsonBeyondHalfWidth { is_of_capacity: true, .. } => {
+                (Code::ImpossibleDesign, ". Use a smaller `load.allowable_stress_mpa`, or leave it out")
+            }
+            SolveError::FlatOffCarrier { .. } => {
+                (Code::ImpossibleDesign, ". Use longer flats, or a wider carrier (`parts.carrier`)")
+            }
+            SolveError::TurnedPastTeeth => (
+                Code::ImpossibleDesign,
+                ". Use a lower torque or smaller gaps, or remove `wave_generator_moves` from `model.refinements`",
             ),
             SolveError::TooManyPoints { points, limit } => {
                 let detail = format!("{detail} by `max_profile_points`. Use a larger chord tolerance");
                 let pointer = "/profile/chord_tolerance_mm";
-                too_many(NoAnswerCode::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, Some(points), limit)
+                return too_many(Code::TooManyPoints, FieldCode::TooManyPoints, pointer, &detail, Some(points), limit);
             }
             SolveError::TooManyStates { limit } => {
                 let detail = format!("{detail} by `max_states`. Use a larger tolerance");
                 let pointer = "/sweep/tolerance";
-                too_many(NoAnswerCode::TooManyStates, FieldCode::TooManyStates, pointer, &detail, None, limit)
+                return too_many(Code::TooManyStates, FieldCode::TooManyStates, pointer, &detail, None, limit);
             }
-            SolveError::Stopped => Self::stopped(),
-            SolveError::Inconsistent { .. } => Self::internal(detail),
-            SolveError::NotConverged(error) => Self::internal(error),
-        }
+            SolveError::Impossible(violations) => return Self::impossible(&violations),
+            SolveError::Stopped => return Self::stopped(),
+            SolveError::Inconsistent { .. } | SolveError::NotConverged(_) => (Code::InternalError, ""),
+        };
+        Self::new(code, detail + advice)
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use toothwave_solver::backing::Backings;
 use toothwave_solver::drive::Draft;
-use toothwave_solver::{LoadCase, Parameter, Part, SolveError, Violation, model_error};
+use toothwave_solver::{LoadCase, Parameter, Part, Violation, model_error};
 pub use toothwave_solver::{Never, Stop};
 
 use crate::design::{Design, PartsDocument, SeriesComplianceDocument, TeethDocument};
@@ -40,7 +40,7 @@ pub trait Question: Send + 'static {
     type Answer: Forms;
 
     /// Name of the question in the key.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> String;
 
     /// Returns the parts of a normalised document that the answer depends on.
     fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a;
@@ -63,7 +63,7 @@ pub trait Question: Send + 'static {
 
     /// Returns the key of the answer in this form. Equal keys mean equal bytes in every process.
     fn key(&self, design: &Design, form: &impl Serialize) -> Key {
-        Key::new(self.name(), &self.reads(design), form)
+        Key::new(&self.name(), &self.reads(design), form)
     }
 
     /// Parses, checks and computes.
@@ -83,7 +83,7 @@ pub(crate) fn require_finite(columns: impl IntoIterator<Item = impl AsRef<[f64]>
 
 /// Returns the drive of a document, as far as it is possible, and adds its violations.
 pub(crate) fn checked_drive(design: &Design, violations: &mut Vec<Violation>) -> Result<Draft, NoAnswer> {
-    let draft = Draft::new(&design.drive_parameters()).map_err(SolveError::from)?;
+    let draft = Draft::new(&design.drive_parameters())?;
     violations.extend(design.as_written(draft.violations()));
     Ok(draft)
 }
@@ -123,7 +123,7 @@ pub(crate) fn checked_load(
         .ok();
     violations.extend(of_clearances);
     violations.extend(design.duty_violations()?);
-    violations.extend(parameters.clearance_violations(draft).map_err(SolveError::from)?);
+    violations.extend(parameters.clearance_violations(draft)?);
     violations.extend(draft.drive().and_then(|drive| parameters.modification.violation_in(&drive)));
     violations.extend(parameters.carrier_violations(draft));
     for violation in violations_of_supports(design, draft)? {
@@ -132,7 +132,7 @@ pub(crate) fn checked_load(
             violations.push(violation);
         }
     }
-    violations.extend(parameters.deviation_violations(&design.drive_parameters(), &(&design.deviations).into()));
+    violations.extend(parameters.deviation_violations(&design.drive_parameters(), &design.deviations));
     Ok(load)
 }
 

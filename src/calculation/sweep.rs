@@ -63,16 +63,9 @@ const ANGLE_BYTES: u64 = 11 * 8;
 /// A number of about 18 characters and its comma.
 const NUMBER_TEXT_BYTES: usize = 20;
 
-/// Memory per state and per input angle.
-#[derive(Debug, Clone, Copy)]
-struct Each {
-    state_bytes: u64,
-    angle_bytes: u64,
-}
-
 impl CheckedSweep {
-    /// Returns the memory per state and per input angle in the answer.
-    fn each(&self) -> Each {
+    /// Returns the memory of the answer's columns.
+    fn columns_bytes(&self, states: u64, input_angles: u64) -> u64 {
         // Three columns of slips and one of words.
         const LOSSES_BYTES: u64 = 3 * 8 + 2;
         // Ratios by contact, bearing and race, powers, and wear.
@@ -85,10 +78,9 @@ impl CheckedSweep {
         // With friction every point is swept, one at a time, in addition to the hardest.
         let sweeps = 1 + of(losses.is_some() && duty.points.len() > 1, 1);
         let of_wear = (duty.points.len() as u64 + 1) * of(has_wear, WEAR_BYTES);
-        Each {
-            state_bytes: sweeps * (STATE_BYTES + of(losses.is_some(), LOSSES_BYTES)) + of_wear,
-            angle_bytes: sweeps * (ANGLE_BYTES + of(losses.is_some(), LOSSES_ANGLE_BYTES)),
-        }
+        let state_bytes = sweeps * (STATE_BYTES + of(losses.is_some(), LOSSES_BYTES)) + of_wear;
+        let angle_bytes = sweeps * (ANGLE_BYTES + of(losses.is_some(), LOSSES_ANGLE_BYTES));
+        states * state_bytes + input_angles * angle_bytes
     }
 
     /// Returns the drive.
@@ -187,8 +179,8 @@ impl Question for Sweep {
     type Checked = CheckedSweep;
     type Answer = SweepAnswer;
 
-    fn name(&self) -> &'static str {
-        "sweep"
+    fn name(&self) -> String {
+        "sweep".into()
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
@@ -215,7 +207,7 @@ impl Question for Sweep {
                 return Err(NoAnswer::impossible(&violations));
             }
         };
-        let deviations = Deviations::from(&design.deviations);
+        let deviations = design.deviations.clone();
         let duty = design.duty()?;
         if let Points::Samples(samples) = points {
             let sweeps = duty.points.len() as u64;
@@ -253,8 +245,7 @@ impl Question for Sweep {
     fn max_bytes(checked: &CheckedSweep, format: Format) -> Option<u64> {
         let Points::Samples(samples) = checked.points else { return None };
         let mesh = checked.load().mesh(&checked.drive, &checked.deviations);
-        let Each { state_bytes, angle_bytes } = checked.each();
-        let columns_bytes = mesh.state_count(samples) * state_bytes + (mesh.last_sample(samples) + 1) * angle_bytes;
+        let columns_bytes = checked.columns_bytes(mesh.state_count(samples), mesh.last_sample(samples) + 1);
         // A plot sorts the states by position, which needs the same memory again.
         Some(if format == Format::Svg { 2 * columns_bytes } else { format.bytes_with_text(columns_bytes) })
     }
@@ -287,44 +278,42 @@ impl Question for Sweep {
         let go_on = || if stop.stopped() { Err(NoAnswer::stopped()) } else { Ok(()) };
         go_on()?;
         let mesh = sweep.mesh;
-        let mut findings = drive_findings(drive)?;
-        let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();
         let peaks = fingers.as_ref().map_or(sweep.peaks, |fingers| fingers.peaks_along(&sweep.peaks));
-        let of_contacts = findings::of_contacts(drive, load, &peaks, approaches_matter);
         let finger_stress = checked.finger_stress(&sweep.peaks);
-        let of_fingers = finger_stress.as_ref().and_then(findings::of_fingers);
-        let of_half_widths = findings::of_half_widths(drive, load, &sweep.states, checked.load_peak_over_mean());
-        let of_wind_up = findings::of_wind_up(drive, load, &sweep);
-        let of_projection = findings::of_projection(drive, load).map_err(SolveError::from)?;
         let shares = Shares::of(drive, load, backings, &sweep.peaks);
-        let of_backing = shares.as_ref().map_or_else(Vec::new, findings::of_backing);
         let parts = Some((backings, shares.as_ref()));
+        let mut found = Vec::from_iter(findings::of_wind_up(drive, load, &sweep));
+        found.extend(findings::of_half_widths(drive, load, &sweep.states, checked.load_peak_over_mean()));
         go_on()?;
-        let model_error = error_of_model::of(drive, load, deviations, &sweep, parts).map_err(SolveError::from)?;
+        let model_error = error_of_model::of(drive, load, deviations, &sweep, parts)?;
         go_on()?;
         let forces = checked.radial_forces(&sweep, stop)?;
         let losses = checked.losses(&sweep, forces.as_ref(), stop)?;
         let duty_answer = checked.is_duty.then(|| DutyAnswer::new(drive, duty, losses.as_ref()));
-        let (losses, of_friction) = match losses {
+        let losses = match losses {
             Some(DutyLosses { totals, hardest, findings, .. }) => {
+                found.extend(findings);
                 let totals = checked.losses_along(totals);
-                (Some(LossesAnswer::new(&Mechanism::of(drive), totals, hardest, &sweep)?), findings)
+                Some(LossesAnswer::new(&Mechanism::of(drive), totals, hardest, &sweep)?)
             }
-            None => (None, Vec::new()),
+            None => None,
         };
         let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
-        let of_model = of_half_widths.iter().chain(&of_friction).chain(&of_projection).chain(&of_backing);
-        let of_sweep = of_wind_up.iter().chain(of_model).chain(&of_contacts).chain(&of_fingers);
+        found.extend(findings::of_projection(drive, load)?);
+        found.extend(shares.iter().flat_map(findings::of_backing));
+        let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();
+        found.extend(findings::of_contacts(drive, load, &peaks, approaches_matter));
+        found.extend(finger_stress.as_ref().and_then(findings::of_fingers));
+        let backlash = with_wind_up.then(|| checked.backlash(stop));
+        found.extend(backlash.as_ref().and_then(findings::of_backlash));
         let causes = Causes {
             wave_generator_moves: load.parameters().wave_generator_moves,
             fingers: backings.support().fingers,
             gap_fields: checked.gap_fields(),
             ..Causes::default()
         };
-        findings.extend(of_sweep.map(|finding| FindingAnswer::new(finding, drive, causes)));
-        let backlash = with_wind_up.then(|| checked.backlash(stop));
-        let of_backlash = backlash.as_ref().and_then(findings::of_backlash);
-        findings.extend(of_backlash.map(|finding| FindingAnswer::new(&finding, drive, causes)));
+        let mut findings = drive_findings(drive)?;
+        findings.extend(found.iter().map(|finding| FindingAnswer::new(finding, drive, causes)));
         findings.extend(checked.of_document.iter().cloned());
         let unloaded_wind_up_deg = if asks_without_load {
             Some(solver::unloaded_wind_up_deg(drive, load, deviations, &sweep, stop)?)

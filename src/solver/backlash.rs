@@ -166,7 +166,9 @@ fn mirrored(deviations: &Deviations) -> Deviations {
         ring_space_um: list(&deviations.ring_space_um, 1.0),
         ring_space_angle_arcsec: list(&deviations.ring_space_angle_arcsec, -1.0),
         wave_generator_lobe_um: list(&deviations.wave_generator_lobe_um, 1.0),
-        runout: PerContact::of(|contact| runout(deviations.runout.get(contact))),
+        wave_generator_runout: runout(&deviations.wave_generator_runout),
+        ring_runout: runout(&deviations.ring_runout),
+        carrier_runout: runout(&deviations.carrier_runout),
     }
 }
 

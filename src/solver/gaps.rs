@@ -54,23 +54,31 @@ pub struct TipRelief {
     pub power: f64,
 }
 
-/// Deviations of each item of a measured or randomly generated drive. An empty list means zeros.
+/// Deviations of individual items of the parts, measured or random, with `virtual_work` only. A positive value opens a
+/// gap. A positive angle is a rotation away from the flank under load. A list has one entry for each item, counted from
+/// 0, or is empty if no item deviates.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(deny_unknown_fields, default, expecting = "an object"), schema(as = DeviationsDocument))]
 pub struct Deviations {
-    /// Reduction of the tooth radius, by slot.
+    /// Reduction of the teeth's radius, by slot, in µm.
     pub tooth_radius_um: Vec<f64>,
-    /// Rotation of the slots away from the flank under load, by slot.
+    /// Rotation of the slots about the axis, by slot, in arcsec.
     pub slot_angle_arcsec: Vec<f64>,
-    /// Set-back of the slot walls, by slot.
+    /// Offset of the slots' walls, by slot, in µm.
     pub slot_wall_um: Vec<f64>,
-    /// Set-back of the profiles along their normals, by ring space.
+    /// Offset of the profiles along their normals, by ring space, in µm.
     pub ring_space_um: Vec<f64>,
-    /// Rotation of the ring spaces away from the flank under load, by ring space.
+    /// Rotation of the ring's spaces about the axis, by ring space, in arcsec.
     pub ring_space_angle_arcsec: Vec<f64>,
-    /// Set-back of the wave generator, by lobe.
+    /// Offset of the wave generator along its normals, by lobe, in µm.
     pub wave_generator_lobe_um: Vec<f64>,
-    /// Offset of each part from the axis.
-    pub runout: PerContact<Runout>,
+    /// Runout of the wave generator. Its angle is counted from the middle of lobe 0.
+    pub wave_generator_runout: Runout,
+    /// Runout of the ring. Its angle is counted from the middle of space 0.
+    pub ring_runout: Runout,
+    /// Runout of the carrier. Its angle is counted from slot 0.
+    pub carrier_runout: Runout,
 }
 
 /// Runout: distance of a part's centre from the axis, in a direction that is fixed in the part.
@@ -85,6 +93,11 @@ pub struct Runout {
 }
 
 impl Deviations {
+    /// Returns the runout of the part that the teeth touch at each contact.
+    pub const fn runout(&self) -> PerContact<Runout> {
+        PerContact { wave_generator: self.wave_generator_runout, ring: self.ring_runout, carrier: self.carrier_runout }
+    }
+
     /// Returns the lists, each with its kind.
     fn lists(&self) -> [(Listed, &[f64]); 6] {
         [
@@ -122,7 +135,7 @@ impl Deviations {
             let entries = list.iter().enumerate();
             violations.extend(entries.filter_map(|(entry, &value)| Parameter::Deviation(listed, entry).check(value)));
         }
-        for (contact, &Runout { amount_um, angle_deg }) in self.runout.iter() {
+        for (contact, &Runout { amount_um, angle_deg }) in self.runout().iter() {
             violations.extend(Parameter::RunoutAmount(contact).check(amount_um));
             violations.extend(Parameter::RunoutAngle(contact).check(angle_deg));
         }
@@ -135,15 +148,15 @@ impl Deviations {
     }
 
     fn are_of_slots(&self) -> bool {
-        any([&self.tooth_radius_um, &self.slot_angle_arcsec, &self.slot_wall_um]) || self.runout.carrier.is_any()
+        any([&self.tooth_radius_um, &self.slot_angle_arcsec, &self.slot_wall_um]) || self.carrier_runout.is_any()
     }
 
     fn are_of_ring_spaces(&self) -> bool {
-        any([&self.ring_space_um, &self.ring_space_angle_arcsec]) || self.runout.ring.is_any()
+        any([&self.ring_space_um, &self.ring_space_angle_arcsec]) || self.ring_runout.is_any()
     }
 
     fn are_of_lobes(&self) -> bool {
-        any([&self.wave_generator_lobe_um]) || self.runout.wave_generator.is_any()
+        any([&self.wave_generator_lobe_um]) || self.wave_generator_runout.is_any()
     }
 
     /// Returns the mesh of a drive with these deviations. Its sweep has as many load periods as it takes until the same
@@ -464,13 +477,14 @@ impl<'a> Gaps<'a> {
         let along_mm = |runout: &Runout, direction_rad: f64| {
             MM_PER_UM * runout.amount_um * (direction_rad - runout.angle_deg.to_radians()).cos()
         };
-        let runout = &deviations.runout;
         gap_mm.wave_generator += MM_PER_UM * of(&deviations.wave_generator_lobe_um, lobe)
-            - along_mm(&runout.wave_generator, cam_rad)
+            - along_mm(&deviations.wave_generator_runout, cam_rad)
             + thinner_mm;
-        gap_mm.ring +=
-            MM_PER_UM * of(&deviations.ring_space_um, ring_space) + along_mm(&runout.ring, ring_rad) + thinner_mm;
-        gap_mm.carrier +=
-            MM_PER_UM * of(&deviations.slot_wall_um, slot) + along_mm(&runout.carrier, wall_rad) + thinner_mm;
+        gap_mm.ring += MM_PER_UM * of(&deviations.ring_space_um, ring_space)
+            + along_mm(&deviations.ring_runout, ring_rad)
+            + thinner_mm;
+        gap_mm.carrier += MM_PER_UM * of(&deviations.slot_wall_um, slot)
+            + along_mm(&deviations.carrier_runout, wall_rad)
+            + thinner_mm;
     }
 }

@@ -9,7 +9,7 @@ use crate::quantity::Quantity;
 
 /// Returns an error of the study document.
 pub(crate) fn fault(pointer: &str, code: FieldCode, detail: impl Into<String>) -> NoAnswer {
-    Fault { pointer: pointer.into(), code, detail: detail.into() }.into()
+    Fault::at(pointer, code, detail).into()
 }
 
 /// Returns an error of a value beyond a limit.

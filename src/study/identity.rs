@@ -57,13 +57,14 @@ pub(crate) fn id(
         Ok(read) => tree_of(&read.normalised().with_defaults().in_one_spelling(is_only_drive)),
         Err(_) => Ok(design.clone()),
     };
-    let mut parts = designs.iter().map(|design| hash_of(&in_one_spelling(design)?)).collect::<Result<Vec<_>, _>>()?;
-    parts.push(hash_of(&asked)?);
+    let mut parts = designs.iter().map(|design| hash_of(in_one_spelling(design)?)).collect::<Result<Vec<_>, _>>()?;
+    parts.push(hash_of(asked)?);
     let within = format!("{} states, {} points", limits.max_states, limits.max_profile_points);
     Ok(Key::new("study", &parts.join(" ").as_str(), &within.as_str()))
 }
 
-fn hash_of(tree: &Tree) -> Result<String, NoAnswer> {
-    let text = serde_json::to_string(&tree.clone().sorted()).map_err(NoAnswer::internal)?;
+fn hash_of(mut tree: Tree) -> Result<String, NoAnswer> {
+    tree.sort();
+    let text = serde_json::to_string(&tree).map_err(NoAnswer::internal)?;
     Ok(Key::new("study", &text.as_str(), &"").to_string())
 }

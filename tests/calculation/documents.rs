@@ -18,7 +18,7 @@ use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question, Stop};
 use toothwave_calculation::sweep::Sweep;
 use toothwave_solver::gaps::{Runout, TipRelief};
-use toothwave_solver::{Deviations, Modification, PerContact};
+use toothwave_solver::{Deviations, Modification};
 
 use crate::schema::{Chance, Schemas, leaves, objects};
 
@@ -294,10 +294,12 @@ fn each_deviation_reaches_the_solver() {
         ring_space_um: vec![5.0],
         ring_space_angle_arcsec: vec![6.0],
         wave_generator_lobe_um: vec![7.0, 8.0],
-        runout: PerContact { wave_generator: runout(9.0, 10.0), ring: runout(11.0, 0.0), carrier: runout(0.0, 12.0) },
+        wave_generator_runout: runout(9.0, 10.0),
+        ring_runout: runout(11.0, 0.0),
+        carrier_runout: runout(0.0, 12.0),
     };
     let design = read(&document).unwrap();
-    assert_eq!(Deviations::from(&design.deviations), expected);
+    assert_eq!(design.deviations, expected);
     // A written document reads back as itself.
     assert_eq!(read(&serde_json::to_value(&design).unwrap()).unwrap(), design);
 }

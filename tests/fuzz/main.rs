@@ -17,7 +17,7 @@ use toothwave_calculation::geometry::Geometry;
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{Limits, Question};
 use toothwave_calculation::sweep::Sweep;
-use toothwave_solver::{Deviations, Never};
+use toothwave_solver::Never;
 
 /// Limits small enough for thousands of answers.
 const LIMITS: Limits = Limits::new(2_000, 20_000);
@@ -366,7 +366,7 @@ fn most_kinds_shapes_and_laws_have_an_answer() {
             answered.insert(word("/model/compatibility"));
             let is_modified = document["modification"].as_object().into_iter().flatten().any(|(_, value)| value != 0.0);
             answered.insert(if is_modified { "modified" } else { "conjugate" }.to_owned());
-            if !Deviations::from(&design.deviations).is_nil() {
+            if !design.deviations.is_nil() {
                 answered.insert("deviating".to_owned());
             }
         }

@@ -264,7 +264,9 @@ fn scaled(deviations: &Deviations, size: f64) -> Deviations {
         ring_space_um: list(&deviations.ring_space_um),
         ring_space_angle_arcsec: list(&deviations.ring_space_angle_arcsec),
         wave_generator_lobe_um: list(&deviations.wave_generator_lobe_um),
-        runout: PerContact::of(|contact| runout(deviations.runout.get(contact))),
+        wave_generator_runout: runout(&deviations.wave_generator_runout),
+        ring_runout: runout(&deviations.ring_runout),
+        carrier_runout: runout(&deviations.carrier_runout),
     }
 }
 
@@ -346,7 +348,7 @@ impl Bodies<'_> {
         let lobe = usize::try_from(tooth.lobe).unwrap();
         let lobe_um = Self::of_item(&self.deviations.wave_generator_lobe_um, lobe);
         let set_back_um = self.gaps_um.wave_generator + self.m.wave_generator_equidistant_um + lobe_um;
-        let off = runout(&self.deviations.runout.wave_generator);
+        let off = runout(&self.deviations.wave_generator_runout);
         point - (1e-3 * set_back_um + self.thinner_mm(tooth)) * unit(normal_rad) + off
     }
 
@@ -383,7 +385,7 @@ impl Bodies<'_> {
         let turned = Self::of_item(&self.deviations.ring_space_angle_arcsec, tooth.space) + apart;
         let middle_rad = 2.0 * PI * tooth.space as f64 / self.p.ring_teeth as f64;
         let rotation = nalgebra::Rotation2::new(middle_rad - self.s() * turned * ARCSEC);
-        rotation * center + runout(&self.deviations.runout.ring)
+        rotation * center + runout(&self.deviations.ring_runout)
     }
 
     /// All teeth that touch flanks, when the input has turned.
@@ -448,7 +450,7 @@ impl Bodies<'_> {
         let slot_rad = 2.0 * PI * tooth.slot as f64 / self.p.installed as f64 + self.s() * turned * ARCSEC;
         // The carrier's own axis, off by its runout, turns with it.
         let aside_mm = |turn_rad: f64| {
-            let off = nalgebra::Rotation2::new(carrier_rad + turn_rad) * runout(&self.deviations.runout.carrier);
+            let off = nalgebra::Rotation2::new(carrier_rad + turn_rad) * runout(&self.deviations.carrier_runout);
             unit(carrier_rad + turn_rad + slot_rad).perp(&(center - off)) - sense * free_mm
         };
         let (mut low, mut high) = (-0.1, 0.1);

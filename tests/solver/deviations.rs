@@ -88,22 +88,18 @@ pub(crate) fn deviations(p: &DriveParameters, kinds: Kinds, seed: u64) -> Deviat
         if is_wanted { (0..items).map(|_| size * random()).collect() } else { Vec::new() }
     };
     let Kinds { slots, ring_spaces, lobes } = kinds;
-    let mut found = Deviations {
+    let runout = |is_wanted: bool, angle_deg| Runout { amount_um: if is_wanted { 3.0 } else { 0.0 }, angle_deg };
+    Deviations {
         tooth_radius_um: list(slots, p.installed, 1.0),
         slot_angle_arcsec: list(slots, p.installed, 4.0),
         slot_wall_um: list(slots, p.installed, 2.0),
         ring_space_um: list(ring_spaces, p.ring_teeth, 2.0),
         ring_space_angle_arcsec: list(ring_spaces, p.ring_teeth, 4.0),
         wave_generator_lobe_um: list(lobes, p.wave_generator.lobes(), 2.0),
-        runout: PerContact::default(),
-    };
-    let runout = |is_wanted: bool, angle_deg| Runout { amount_um: if is_wanted { 3.0 } else { 0.0 }, angle_deg };
-    found.runout = PerContact {
-        wave_generator: runout(lobes, 40.0),
-        ring: runout(ring_spaces, -100.0),
-        carrier: runout(slots, 250.0),
-    };
-    found
+        wave_generator_runout: runout(lobes, 40.0),
+        ring_runout: runout(ring_spaces, -100.0),
+        carrier_runout: runout(slots, 250.0),
+    }
 }
 
 /// Returns a load with clearances that cover the deviations.
@@ -229,15 +225,15 @@ fn chain(p: &DriveParameters, load: &LoadParameters, deviations: &Deviations, pl
     let thinner = um * entry(&deviations.tooth_radius_um, placed.slot);
     let gaps_mm = [
         thinner + um * entry(&deviations.wave_generator_lobe_um, placed.lobe)
-            - off(&deviations.runout.wave_generator, in_cam),
+            - off(&deviations.wave_generator_runout, in_cam),
         thinner
             + um * entry(&deviations.ring_space_um, placed.ring_space)
             + ARCSEC * entry(&deviations.ring_space_angle_arcsec, placed.ring_space) * d * beta.sin()
-            + off(&deviations.runout.ring, in_ring),
+            + off(&deviations.ring_runout, in_ring),
         thinner
             + um * entry(&deviations.slot_wall_um, placed.slot)
             + ARCSEC * entry(&deviations.slot_angle_arcsec, placed.slot) * d
-            + off(&deviations.runout.carrier, in_carrier),
+            + off(&deviations.carrier_runout, in_carrier),
     ];
     let PerContact { wave_generator, ring, carrier } = load.clearance_um;
     let clearance = [wave_generator, ring, carrier];
@@ -389,9 +385,12 @@ fn sixteen_million_laps_are_refused_at_once() {
 #[test]
 fn zero_deviations_sweep_one_zone() {
     let drive = drive(&PAPER_5_1);
+    let none = Runout { amount_um: 0.0, angle_deg: 77.0 };
     let nothing = Deviations {
         slot_wall_um: vec![0.0; 28],
-        runout: PerContact::of(|_| Runout { amount_um: 0.0, angle_deg: 77.0 }),
+        wave_generator_runout: none,
+        ring_runout: none,
+        carrier_runout: none,
         ..Deviations::default()
     };
     let load = load(20.0, Projection);
@@ -469,7 +468,9 @@ fn rotated_lists_shift_sweep_by_a_load_period() {
     let load = cleared(20.0, FIXED);
     let mut from_0 = deviations(&p, ALL_KINDS[6], 5);
     // A runout's direction cannot be rotated by whole items of every part.
-    from_0.runout = PerContact::default();
+    from_0.wave_generator_runout = Runout::default();
+    from_0.ring_runout = Runout::default();
+    from_0.carrier_runout = Runout::default();
     let from_1 = Deviations {
         tooth_radius_um: turned_by(&from_0.tooth_radius_um, 1),
         slot_angle_arcsec: turned_by(&from_0.slot_angle_arcsec, 1),
@@ -495,10 +496,7 @@ fn eccentric_off_axis_has_another_eccentricity() {
     let p = of(eccentric(1.0), 12, 12, 11, 4.0);
     let none = cleared(20.0, FIXED);
     let amount_um = 1e-3;
-    let off = Deviations {
-        runout: PerContact { wave_generator: Runout { amount_um, angle_deg: 0.0 }, ..PerContact::default() },
-        ..Deviations::default()
-    };
+    let off = Deviations { wave_generator_runout: Runout { amount_um, angle_deg: 0.0 }, ..Deviations::default() };
     for tooth in placed_by_angles(&p, 0.3) {
         let found_mm = chain(&p, &none, &off, tooth).gap_mm - chain(&p, &none, &Deviations::default(), tooth).gap_mm;
         let (h, slope) = support(&p, chain(&p, &none, &off, tooth).normal_rad);
@@ -620,7 +618,7 @@ fn reports_all_impossible_deviations() {
     let drive = drive(&PAPER_5_1);
     let wrong = Deviations {
         slot_wall_um: vec![1.0; 27],
-        runout: PerContact { ring: Runout { amount_um: -1.0, angle_deg: 400.0 }, ..PerContact::default() },
+        ring_runout: Runout { amount_um: -1.0, angle_deg: 400.0 },
         ..Deviations::default()
     };
     let refused = swept_with(&drive, &load(20.0, Projection), &wrong, Points::samples(4).unwrap()).unwrap_err();

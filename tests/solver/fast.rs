@@ -757,11 +757,9 @@ impl Deviating {
             ring_space_um: list(ring_space, spaces),
             ring_space_angle_arcsec: list(ring_space_angle, spaces),
             wave_generator_lobe_um: list(lobe, parameters.wave_generator.lobes()),
-            runout: PerContact {
-                wave_generator: runout(&wave_generator),
-                ring: runout(&ring),
-                carrier: runout(&carrier),
-            },
+            wave_generator_runout: runout(&wave_generator),
+            ring_runout: runout(&ring),
+            carrier_runout: runout(&carrier),
         }
     }
 }

@@ -189,8 +189,12 @@ fn runout_changes_gaps_between_real_curves() {
             let position = degrees.to_radians();
             let off = unit(angle_deg.to_radians()) * SMALL_MM;
             let runout = Runout { amount_um: SMALL_UM, angle_deg };
-            let all = PerContact { wave_generator: runout, ring: runout, carrier: runout };
-            let deviations = Deviations { runout: all, ..Deviations::default() };
+            let deviations = Deviations {
+                wave_generator_runout: runout,
+                ring_runout: runout,
+                carrier_runout: runout,
+                ..Deviations::default()
+            };
             for lobe in [0, 1] {
                 let place = Place { slot: 9, ring_space: 4, lobe };
                 let found = gaps_of(&drive, Modification::default(), &deviations, &place, &tooth);
@@ -335,14 +339,15 @@ fn deviating_teeth_of_both_zones_share_load() {
         assert!((one - other).abs() < 1e-9);
     }
     // A cam off its axis loads one zone more.
-    let off = PerContact { wave_generator: Runout { amount_um: 2.0, angle_deg: 40.0 }, ..PerContact::default() };
-    let (unlike, torque) = solved(Some(&Deviations { runout: off, ..Deviations::default() }), 2).unwrap();
+    let off = Runout { amount_um: 2.0, angle_deg: 40.0 };
+    let (unlike, torque) =
+        solved(Some(&Deviations { wave_generator_runout: off, ..Deviations::default() }), 2).unwrap();
     assert!((torque / 20e3 - 1.0).abs() < 1e-14);
     let sums: Vec<f64> = unlike.chunks(alike.len()).map(|zone| zone.iter().sum()).collect();
     assert!(sums[0] > 1.1 * sums[1], "{sums:?}");
     // The runout exceeds the clearance.
-    let far = PerContact { wave_generator: Runout { amount_um: 60.0, angle_deg: 40.0 }, ..PerContact::default() };
-    let refused = solved(Some(&Deviations { runout: far, ..Deviations::default() }), 2);
+    let far = Runout { amount_um: 60.0, angle_deg: 40.0 };
+    let refused = solved(Some(&Deviations { wave_generator_runout: far, ..Deviations::default() }), 2);
     assert!(matches!(refused, Err(SolveError::Interference { gap_um, .. }) if gap_um < 0.0), "{refused:?}");
 }
 

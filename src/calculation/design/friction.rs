@@ -101,18 +101,27 @@ impl FrictionDocument {
     /// Returns the parameters of the losses. Fails also if a bearing has a rating and the wave generator is no
     /// eccentric circle.
     pub(super) fn loss_parameters(&self, is_eccentric: bool) -> Result<LossParameters, Vec<Violation>> {
-        let mut violations = self.violations_beside();
-        if self.bearing_rating().is_some() && !is_eccentric {
-            violations.push(Violation::conflict(
-                Parameter::BearingLoadRating,
-                "a bearing's life by ISO 281 follows from the load across an eccentric circle: lobes that are loaded alike leave none, and a race that they bend has another life",
-            ));
+        let (wear_rate_mm3_per_nm, bearing) = (self.wear_rate_mm3_per_nm(), self.bearing_rating());
+        let mut violations = Vec::new();
+        if let WaveGeneratorFrictionDocument::Rolling(RollingDocument { coefficient: Some(unused), .. }) =
+            self.wave_generator
+        {
+            violations.extend(Parameter::FrictionCoefficient(Contact::WaveGenerator).check(unused));
+        }
+        for (contact, &rate) in wear_rate_mm3_per_nm.iter().flat_map(PerContact::iter) {
+            violations.extend(Parameter::WearRate(contact).check(rate));
+        }
+        if let Some(bearing) = &bearing {
+            violations.extend(Parameter::BearingLoadRating.check(bearing.dynamic_load_rating_n));
+            if !is_eccentric {
+                violations.push(Violation::conflict(
+                    Parameter::BearingLoadRating,
+                    "a bearing's life by ISO 281 follows from the load across an eccentric circle: lobes that are loaded alike leave none, and a race that they bend has another life",
+                ));
+            }
         }
         match Friction::new(&self.into()) {
-            Ok(friction) if violations.is_empty() => {
-                let (wear_rate_mm3_per_nm, bearing) = (self.wear_rate_mm3_per_nm(), self.bearing_rating());
-                Ok(LossParameters { friction, wear_rate_mm3_per_nm, bearing })
-            }
+            Ok(friction) if violations.is_empty() => Ok(LossParameters { friction, wear_rate_mm3_per_nm, bearing }),
             friction => {
                 violations.extend(friction.err().into_iter().flatten());
                 Err(violations)
@@ -139,27 +148,6 @@ impl FrictionDocument {
             WaveGeneratorFrictionDocument::Rolling(rolling) => (rolling.bearing_load_rating_n, rolling.bearing_element),
         };
         Some(BearingRating { dynamic_load_rating_n: rating_n?, element })
-    }
-
-    /// What is out of its range beside friction itself: wear rates, the bearing's rating, and a coefficient that stands where nothing depends on
-    /// it.
-    fn violations_beside(&self) -> Vec<Violation> {
-        let rates = self.wear_rate_mm3_per_nm();
-        let rates =
-            rates.iter().flat_map(|rates| rates.iter().map(|(contact, &rate)| (Parameter::WearRate(contact), rate)));
-        let rating = self.bearing_rating().map(|rating| (Parameter::BearingLoadRating, rating.dynamic_load_rating_n));
-        let checked = rates.chain(rating).filter_map(|(parameter, value)| parameter.check(value));
-        self.idle_violation().into_iter().chain(checked).collect()
-    }
-
-    /// Returns the violation of the unused coefficient, if it is out of its range.
-    fn idle_violation(&self) -> Option<Violation> {
-        match &self.wave_generator {
-            WaveGeneratorFrictionDocument::Rolling(RollingDocument { coefficient: Some(coefficient), .. }) => {
-                Parameter::FrictionCoefficient(Contact::WaveGenerator).check(*coefficient)
-            }
-            _ => None,
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Load.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use toothwave_solver::PerContact;
 use toothwave_solver::fingers::LoadCycle;
 use utoipa::ToSchema;
@@ -52,34 +52,28 @@ pub struct DutyPointDocument {
 }
 
 /// Allowable contact stress, in MPa: one number for all contacts, or one for each.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum AllowableStressDocument {
-    /// One stress for all contacts.
-    Everywhere(f64),
-    /// One stress for each contact.
-    ByContact(StressByContactDocument),
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AllowableStressDocument(pub PerContact<f64>);
+
+/// Writes one number for three equal ones.
+impl Serialize for AllowableStressDocument {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self(PerContact { wave_generator, ring, carrier }) = self;
+        let is_one = [ring, carrier].iter().all(|stress_mpa| stress_mpa.total_cmp(wave_generator).is_eq());
+        if is_one { ring.serialize(serializer) } else { self.0.serialize(serializer) }
+    }
 }
 
 /// Stress for each contact, in MPa.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
-pub struct StressByContactDocument {
+struct StressByContactDocument {
     /// Between teeth and wave generator, in MPa.
-    pub wave_generator: f64,
+    wave_generator: f64,
     /// Between teeth and ring, in MPa.
-    pub ring: f64,
+    ring: f64,
     /// Between teeth and carrier, in MPa.
-    pub carrier: f64,
-}
-
-impl AllowableStressDocument {
-    /// Returns one number for three equal ones.
-    pub(super) fn normalised(self) -> Self {
-        let PerContact { wave_generator, ring, carrier } = self.into();
-        let is_one = [ring, carrier].iter().all(|stress_mpa| stress_mpa.total_cmp(&wave_generator).is_eq());
-        if is_one { Self::Everywhere(ring) } else { self }
-    }
+    carrier: f64,
 }
 
 either! {
@@ -87,17 +81,8 @@ either! {
         "Allowable contact stress, in MPa: one number for all contacts, or one for each.",
         ObjectBuilder::new().schema_type(Type::Number)
     ) expects "a number, or an object with one for each contact":
-    visit_f64(stress_mpa: f64) => Ok(AllowableStressDocument::Everywhere(stress_mpa)),
-    StressByContactDocument => AllowableStressDocument::ByContact,
-}
-
-impl From<AllowableStressDocument> for PerContact<f64> {
-    fn from(document: AllowableStressDocument) -> Self {
-        match document {
-            AllowableStressDocument::Everywhere(stress_mpa) => Self::of(|_| stress_mpa),
-            AllowableStressDocument::ByContact(StressByContactDocument { wave_generator, ring, carrier }) => {
-                Self { wave_generator, ring, carrier }
-            }
-        }
-    }
+    visit_f64(stress_mpa: f64) => Ok(AllowableStressDocument(PerContact::of(|_| stress_mpa))),
+    StressByContactDocument => |StressByContactDocument { wave_generator, ring, carrier }| {
+        AllowableStressDocument(PerContact { wave_generator, ring, carrier })
+    },
 }

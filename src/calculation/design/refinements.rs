@@ -24,16 +24,6 @@ pub struct Refinements {
 impl Refinements {
     /// The empty set.
     pub const NONE: Self = Self { ring_teeth_bend: false, wave_generator_moves: false, corner_contact: false };
-
-    /// Returns the union of both sets.
-    #[must_use]
-    pub const fn with(self, other: Self) -> Self {
-        Self {
-            ring_teeth_bend: self.ring_teeth_bend || other.ring_teeth_bend,
-            wave_generator_moves: self.wave_generator_moves || other.wave_generator_moves,
-            corner_contact: self.corner_contact || other.corner_contact,
-        }
-    }
 }
 
 /// Refinements in a document.

@@ -3,13 +3,12 @@
 use serde::Serialize;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::violation::Modified;
-use toothwave_solver::{Compatibility, Deviations, Modification, Parameter, Part, PerContact, Violation, model_error};
+use toothwave_solver::{Compatibility, Modification, Parameter, Part, PerContact, Violation, model_error};
 
 use super::{
     ClearanceDocument, Design, DriveDocument, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
-    Refinements, RefinementsDocument, StiffnessDocument, StrengthDocument, TeethDocument,
+    Refinements, RefinementsDocument, StiffnessDocument, TeethDocument,
 };
-use crate::field::FieldCode;
 use crate::json::Fault;
 
 /// Relative difference of a gap and a sum of clearances that is due to rounding.
@@ -106,8 +105,7 @@ impl Design {
                 let detail = format!(
                     "the gap is {gap_um:?} µm here, and {of_parts:?} µm by `parts.{contact}.clearance_um` and `parts.teeth.clearance_um`; leave out `model.clearance`, which is deprecated"
                 );
-                let pointer = Parameter::Clearance(contact).to_string();
-                return Err(Fault { pointer, code: FieldCode::ConflictingFields, detail });
+                return Err(Fault::conflict(&Parameter::Clearance(contact).to_string(), detail));
             }
         }
         Ok(())
@@ -125,7 +123,7 @@ impl Design {
                 Some(true) if is_projection => "`projection` takes no refinement; choose `virtual_work`",
                 _ => continue,
             };
-            return Err(Fault { pointer: pointer.into(), code: FieldCode::ConflictingFields, detail: detail.into() });
+            return Err(Fault::conflict(pointer, detail));
         }
         Ok(())
     }
@@ -142,9 +140,7 @@ impl Design {
 
     /// Returns true if any contact has a gap.
     fn has_gaps(&self) -> bool {
-        self.clearances_um().gaps() != PerContact::default()
-            || !self.modification.is_nil()
-            || !Deviations::from(&self.deviations).is_nil()
+        self.clearances_um().gaps() != PerContact::default() || !self.modification.is_nil() || !self.deviations.is_nil()
     }
 
     /// Returns the choice of `auto` under virtual work. Refinements of balls and flat-sided teeth were not checked
@@ -169,14 +165,14 @@ impl Design {
             Compatibility::VirtualWork if asked.auto => self.refinements_by_geometry(has_pointed_tips),
             _ => Refinements::NONE,
         };
-        let refinements = by_geometry.with(asked.listed);
+        let listed = asked.listed;
         let ModelDocument { ring_teeth_bend, wave_generator_moves, corner_contact, .. } = self.model;
+        let moves = by_geometry.wave_generator_moves || listed.wave_generator_moves;
         Refinements {
-            ring_teeth_bend: ring_teeth_bend.unwrap_or(refinements.ring_teeth_bend),
+            ring_teeth_bend: ring_teeth_bend.unwrap_or(by_geometry.ring_teeth_bend || listed.ring_teeth_bend),
             // If bending is off, the geometry never chose any refinement.
-            wave_generator_moves: wave_generator_moves
-                .unwrap_or(refinements.wave_generator_moves && ring_teeth_bend != Some(false)),
-            corner_contact: corner_contact.unwrap_or(refinements.corner_contact),
+            wave_generator_moves: wave_generator_moves.unwrap_or(moves && ring_teeth_bend != Some(false)),
+            corner_contact: corner_contact.unwrap_or(by_geometry.corner_contact || listed.corner_contact),
         }
     }
 
@@ -233,8 +229,7 @@ impl Design {
     /// Returns the document in one of several spellings with the same meaning: strengths as numbers and, if the drive is
     /// that of every variant, `auto` for the refinements that it means.
     pub fn in_one_spelling(mut self, is_only_drive: bool) -> Self {
-        self.parts.carrier.strength =
-            self.parts.carrier.strength.map(|strength| StrengthDocument::Given(strength.numbers()));
+        self.parts = self.parts.under_load();
         if is_only_drive {
             self.model.refinements = self.model_in_key().refinements;
         }

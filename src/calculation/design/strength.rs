@@ -1,7 +1,6 @@
 //! Strength of the carrier's material: a name, or numbers.
 
 use serde::{Serialize, Serializer};
-use toothwave_solver::Parameter;
 use toothwave_solver::fingers::Strength;
 use utoipa::openapi::schema::{ObjectBuilder, Type};
 
@@ -29,16 +28,6 @@ impl StrengthDocument {
             },
             Self::Given(strength) => strength,
         }
-    }
-
-    /// Returns the numbers with their parameters.
-    pub(super) const fn parameters(&self) -> [(Parameter, f64); 3] {
-        let Strength { yield_mpa, tensile_mpa, endurance_mpa, .. } = self.numbers();
-        [
-            (Parameter::YieldStrength, yield_mpa),
-            (Parameter::TensileStrength, tensile_mpa),
-            (Parameter::EnduranceLimit, endurance_mpa),
-        ]
     }
 }
 

@@ -22,15 +22,13 @@ const FIRST_FREE: u32 = 0x20;
 /// Margin around the drawing in the initial view, as a share of the view's height.
 const VIEW_MARGIN: f64 = 0.1;
 
-/// Name of a layer and its colour in the AutoCAD index.
-struct Layer(&'static str, u8);
-
-const fn layer_of(part: Part) -> Layer {
+/// Returns the name of a part's layer, and its colour in the AutoCAD index.
+const fn layer_of(part: Part) -> (&'static str, u8) {
     match part {
-        Part::WaveGenerator => Layer("WAVE_GENERATOR", 6),
-        Part::Teeth => Layer("TEETH", 2),
-        Part::Ring => Layer("RING", 5),
-        Part::Carrier => Layer("CARRIER", 3),
+        Part::WaveGenerator => ("WAVE_GENERATOR", 6),
+        Part::Teeth => ("TEETH", 2),
+        Part::Ring => ("RING", 5),
+        Part::Carrier => ("CARRIER", 3),
     }
 }
 
@@ -41,10 +39,10 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     dxf.text(999, &title)?;
     dxf.template(&start(drawing))?;
     for body in &drawing.bodies {
-        let layer = layer_of(body.part);
+        let (layer, _) = layer_of(body.part);
         for placement in &body.placements {
             for outline in [&body.outer].into_iter().chain(&body.holes) {
-                dxf.outline(outline, placement, &layer)?;
+                dxf.outline(outline, placement, layer)?;
                 dxf.text(1001, "TOOTHWAVE")?;
                 dxf.text(1000, &title)?;
             }
@@ -59,7 +57,7 @@ fn start(drawing: &DrawingAnswer) -> String {
     let seed = u32::try_from(outlines).unwrap_or(u32::MAX).saturating_add(0x100);
     let reach_mm = svg::reach_mm(&drawing.bodies);
     let layers = drawing.bodies.iter().map(|body| layer_of(body.part));
-    let records = [Layer("0", 7)].into_iter().chain(layers).map(|Layer(name, color)| {
+    let records = [("0", 7)].into_iter().chain(layers).map(|(name, color)| {
         format!("|0 LAYER|5 {{new}}|330 {{table}}|100 AcDbSymbolTableRecord|100 AcDbLayerTableRecord|2 {name}|70 0|62 {color}|6 Continuous|370 -3|390 15")
     });
     START
@@ -119,12 +117,7 @@ impl Dxf<'_> {
         Ok(())
     }
 
-    fn outline(
-        &mut self,
-        outline: &OutlineAnswer,
-        placement: &PlacementAnswer,
-        &Layer(layer, _): &Layer,
-    ) -> io::Result<()> {
+    fn outline(&mut self, outline: &OutlineAnswer, placement: &PlacementAnswer, layer: &str) -> io::Result<()> {
         let place = placement.placing();
         if let Some((center_mm, radius_mm)) = outline.circle() {
             self.entity("CIRCLE", "AcDbCircle", layer)?;
@@ -134,8 +127,12 @@ impl Dxf<'_> {
         }
         let OutlineAnswer::Path { edges } = outline else { return Ok(()) };
         self.entity("LWPOLYLINE", "AcDbPolyline", layer)?;
-        let vertices: usize = edges.iter().map(vertex_count).sum();
-        self.text(90, vertices)?;
+        // The last point of an edge is the first of the next one.
+        let vertex_count = |edge: &EdgeAnswer| match edge {
+            EdgeAnswer::Line { .. } | EdgeAnswer::Arc { .. } => 1,
+            EdgeAnswer::Curve { arcs, .. } => arcs.len(),
+        };
+        self.text(90, edges.iter().map(vertex_count).sum::<usize>())?;
         self.text(70, 1)?; // closed
         for edge in edges {
             match edge {
@@ -159,13 +156,5 @@ impl Dxf<'_> {
     fn entity(&mut self, kind: &str, class: &str, layer: &str) -> io::Result<()> {
         let handle = self.new_handle();
         self.template(&format!("0 {kind}|5 {handle:X}|330 10|100 AcDbEntity|8 {layer}|100 {class}"))
-    }
-}
-
-/// Returns the vertices of an edge except its last, which is the start of the next edge.
-const fn vertex_count(edge: &EdgeAnswer) -> usize {
-    match edge {
-        EdgeAnswer::Line { .. } | EdgeAnswer::Arc { .. } => 1,
-        EdgeAnswer::Curve { arcs, .. } => arcs.len(),
     }
 }

@@ -90,7 +90,6 @@ impl Side {
 
 /// Corners and edges of one loop at one height.
 struct Level {
-    z_mm: f64,
     corners: Vec<Id>,
     edges: Vec<Id>,
     /// Curve under each edge.
@@ -286,7 +285,7 @@ impl Step<'_> {
             let (from, to) = (corners[index], corners[(index + 1) % corners.len()]);
             edges.push(self.record(format_args!("EDGE_CURVE('',{from},{to},{curve},{runs_along})"))?);
         }
-        Ok(Level { z_mm, corners, edges, curves })
+        Ok(Level { corners, edges, curves })
     }
 
     /// Writes the curve under an edge. Returns it and `.T.` if the edge has the same direction.
@@ -320,14 +319,14 @@ impl Step<'_> {
         let mut uprights = Vec::new();
         for (index, (&from, &to)) in bottom.corners.iter().zip(&top.corners).enumerate() {
             let [x, y] = sides[(index + sides.len() - 1) % sides.len()].end();
-            let point = self.point([x, y, bottom.z_mm])?;
+            let point = self.point([x, y, 0.0])?;
             let line = self.line(point, [0.0, 0.0, 1.0])?;
             uprights.push(self.record(format_args!("EDGE_CURVE('',{from},{to},{line},.T.)"))?);
         }
         let mut faces = Vec::new();
         for (index, side) in sides.iter().enumerate() {
             let start = sides[(index + sides.len() - 1) % sides.len()].end();
-            let (surface, faces_outward) = self.surface(side, start, bottom, bottom.curves[index])?;
+            let (surface, faces_outward) = self.surface(side, start, bottom.curves[index])?;
             let next = (index + 1) % sides.len();
             let around = self.edge_loop([
                 (bottom.edges[index], true),
@@ -341,17 +340,17 @@ impl Step<'_> {
         Ok(faces)
     }
 
-    /// Writes the surface over an edge. Returns it and `.T.` if its normal points out of the material, to the right of
-    /// the edge.
-    fn surface(&mut self, side: &Side, start: [f64; 2], bottom: &Level, curve: Id) -> io::Result<(Id, &'static str)> {
+    /// Writes the surface over an edge of the bottom. Returns it and `.T.` if its normal points out of the material, to
+    /// the right of the edge.
+    fn surface(&mut self, side: &Side, start: [f64; 2], curve: Id) -> io::Result<(Id, &'static str)> {
         match side {
             Side::Line { end } => {
                 let [x, y] = unit([end[0] - start[0], end[1] - start[1]]);
-                let place = self.placement([start[0], start[1], bottom.z_mm], [y, -x, 0.0], [x, y, 0.0])?;
+                let place = self.placement([start[0], start[1], 0.0], [y, -x, 0.0], [x, y, 0.0])?;
                 Ok((self.record(format_args!("PLANE('',{place})"))?, ".T."))
             }
             Side::Arc { center: [x, y], radius_mm, is_counter_clockwise, .. } => {
-                let place = self.placement([*x, *y, bottom.z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
+                let place = self.placement([*x, *y, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
                 let cylinder = self.record(format_args!("CYLINDRICAL_SURFACE('',{place},{})", Real(*radius_mm)))?;
                 // A cylinder's normal points away from its axis.
                 Ok((cylinder, if *is_counter_clockwise { ".T." } else { ".F." }))

@@ -23,6 +23,16 @@ impl Fault {
         self
     }
 
+    /// Makes an error at this pointer.
+    pub fn at(pointer: &str, code: FieldCode, detail: impl Into<String>) -> Self {
+        Self { pointer: pointer.into(), code, detail: detail.into() }
+    }
+
+    /// Makes the error of fields that must not stand together.
+    pub fn conflict(pointer: &str, detail: impl Into<String>) -> Self {
+        Self::at(pointer, FieldCode::ConflictingFields, detail)
+    }
+
     /// Makes the error of a field, seen from its object.
     pub fn of_field(code: FieldCode, field: &str, detail: String) -> Self {
         Self { pointer: format!("/{}", escaped(field)), code, detail }

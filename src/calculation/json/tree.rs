@@ -182,22 +182,15 @@ impl Tree {
         size_of::<Self>() + below
     }
 
-    /// Returns the tree with all fields sorted by name, so that equal trees have equal bytes.
-    pub fn sorted(mut self) -> Self {
-        match &mut self {
+    /// Sorts all fields by name, so that equal trees have equal bytes.
+    pub fn sort(&mut self) {
+        match self {
             Self::Object(fields) => {
-                for (_, value) in fields.iter_mut() {
-                    *value = std::mem::replace(value, Self::Null).sorted();
-                }
+                fields.iter_mut().for_each(|(_, value)| value.sort());
                 fields.sort_by(|(one, _), (other, _)| one.cmp(other));
             }
-            Self::Array(items) => {
-                for item in items {
-                    *item = std::mem::replace(item, Self::Null).sorted();
-                }
-            }
+            Self::Array(items) => items.iter_mut().for_each(Self::sort),
             Self::Null | Self::Bool(_) | Self::Number(_) | Self::Text(_) => {}
         }
-        self
     }
 }

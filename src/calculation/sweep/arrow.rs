@@ -3,9 +3,9 @@
 use std::io::{self, Write};
 use std::sync::Arc;
 
-use arrow_array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array};
+use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array};
 use arrow_ipc::writer::StreamWriter;
-use arrow_schema::{ArrowError, DataType, Field, Schema};
+use arrow_schema::{ArrowError, Field, Schema};
 
 use crate::json::word;
 use crate::sweep::Column;
@@ -23,7 +23,7 @@ pub(super) fn write(answer: &SweepAnswer, writer: &mut dyn Write) -> io::Result<
 }
 
 fn write_columns(columns: &[(&str, Column<'_>)], states: usize, writer: &mut dyn Write) -> Result<(), ArrowError> {
-    let field = |(name, column): &(&str, Column<'_>)| Field::new(*name, column.data_type(), false);
+    let field = |(name, column): &(&str, Column<'_>)| Field::new(*name, column.array(0, 0).data_type().clone(), false);
     let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<_>>()));
     let mut stream = StreamWriter::try_new(writer, &schema)?;
     for from in (0..states).step_by(BATCH_STATES) {
@@ -35,15 +35,6 @@ fn write_columns(columns: &[(&str, Column<'_>)], states: usize, writer: &mut dyn
 }
 
 impl Column<'_> {
-    const fn data_type(&self) -> DataType {
-        match self {
-            Self::Numbers(_) => DataType::Float64,
-            Self::Counts(_) => DataType::UInt32,
-            Self::Flags(_) => DataType::Boolean,
-            Self::Rolls(_) => DataType::Utf8,
-        }
-    }
-
     /// The entries of some states, copied.
     fn array(&self, from: usize, to: usize) -> ArrayRef {
         match self {

@@ -104,54 +104,26 @@ fn own_ids(text: &str) -> String {
 fn panels(sweep: &SweepAnswer) -> Vec<Panel<'_>> {
     let SweepAnswer { states, peaks, .. } = sweep;
     let most = if sweep.sweep_period_deg.is_some() { "largest of all teeth, " } else { "" };
-    let contacts = [
-        (
-            "wave generator",
-            "φ_H from the valley, deg",
-            &states.wave_generator_angle_deg,
-            &peaks.wave_generator,
-            &states.force_wave_generator_n,
-            &states.stress_wave_generator_mpa,
-        ),
-        (
-            "ring",
-            "φ_K from the tooth tip, deg",
-            &states.ring_angle_deg,
-            &peaks.ring,
-            &states.force_ring_n,
-            &states.stress_ring_mpa,
-        ),
-        (
-            "carrier",
-            "centre's distance from the axis, mm",
-            &states.center_radius_mm,
-            &peaks.carrier,
-            &states.force_carrier_n,
-            &states.stress_carrier_mpa,
-        ),
+    let x = [
+        ("wave generator", "φ_H from the valley, deg", &states.wave_generator_angle_deg),
+        ("ring", "φ_K from the tooth tip, deg", &states.ring_angle_deg),
+        ("carrier", "centre's distance from the axis, mm", &states.center_radius_mm),
     ];
-    let titled = |quantity: &str, contact: &str, peak: &Peak, unit: &str| {
-        format!("{quantity}, {contact}: up to {:.1} {unit}", peak.value)
-    };
-    let forces = contacts.iter().map(|&(contact, x_label, x, peaks, force, _)| Panel {
-        title: titled("Force", contact, &peaks.force_n, "N"),
-        x_label,
-        y_label: format!("force, {most}N"),
-        color: COLORS[0],
-        x,
-        y: force,
-        peak: &peaks.force_n,
-    });
-    let stresses = contacts.iter().map(|&(contact, x_label, x, peaks, _, stress)| Panel {
-        title: titled("Stress", contact, &peaks.stress_mpa, "MPa"),
-        x_label,
-        y_label: format!("stress, {most}MPa"),
-        color: COLORS[1],
-        x,
-        y: stress,
-        peak: &peaks.stress_mpa,
-    });
-    forces.chain(stresses).collect()
+    let forces = [&states.force_wave_generator_n, &states.force_ring_n, &states.force_carrier_n];
+    let stresses = [&states.stress_wave_generator_mpa, &states.stress_ring_mpa, &states.stress_carrier_mpa];
+    let peaks = [&peaks.wave_generator, &peaks.ring, &peaks.carrier];
+    let quantities = [
+        ("Force", format!("force, {most}N"), "N", COLORS[0], forces, peaks.map(|peaks| &peaks.force_n)),
+        ("Stress", format!("stress, {most}MPa"), "MPa", COLORS[1], stresses, peaks.map(|peaks| &peaks.stress_mpa)),
+    ];
+    let mut panels = Vec::new();
+    for (quantity, y_label, unit, color, y, peaks) in quantities {
+        for (((contact, x_label, x), y), peak) in x.into_iter().zip(y).zip(peaks) {
+            let title = format!("{quantity}, {contact}: up to {:.1} {unit}", peak.value);
+            panels.push(Panel { title, x_label, y_label: y_label.clone(), color, x, y, peak });
+        }
+    }
+    panels
 }
 
 impl Pass {
@@ -167,14 +139,12 @@ impl Pass {
                 || states.input_angle_deg[i] > states.input_angle_deg[i - 1]
         };
         let starts: Vec<usize> = (0..states.tooth.len()).filter(|&i| is_new(i)).collect();
-        let frames: Vec<_> = starts.iter().zip(starts.iter().skip(1)).map(|(&from, &to)| from..to).collect();
-        let last = starts.last().map(|&from| from..states.tooth.len());
+        let ends = starts.iter().skip(1).copied().chain([states.tooth.len()]);
+        let frames: Vec<_> = starts.iter().zip(ends).map(|(&from, to)| from..to).collect();
         let mut points: Vec<(usize, bool)> = Vec::new();
         // The last frame repeats the first; it only tells whether a tooth entered before it.
-        for (index, frame) in frames.iter().enumerate() {
-            let next = frames.get(index + 1).or(last.as_ref());
-            let enters = || next.is_some_and(|next| enters_loaded(states, frame.clone(), next.clone()));
-            let jumps = *enters_under_load && !items_deviate && enters();
+        for (frame, next) in frames.iter().zip(frames.iter().skip(1)) {
+            let jumps = *enters_under_load && !items_deviate && enters_loaded(states, frame.clone(), next.clone());
             points.extend(frame.clone().map(|i| (i, jumps)));
         }
         // Where an angle stands twice, what was before the jump comes first.

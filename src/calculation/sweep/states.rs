@@ -2,10 +2,10 @@
 
 use std::io::{self, Write};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::NUMBER_TEXT_BYTES;
-use crate::forms::csv_error;
+use crate::forms::write_csv;
 use crate::sweep::answer::SweepAnswer;
 use crate::sweep::losses::{LossesAnswer, RollsAnswer};
 
@@ -32,6 +32,23 @@ enum Entry {
     Rolls(RollsAnswer),
 }
 
+/// A state's entries of all columns.
+struct Row<'a> {
+    columns: &'a [Column<'a>],
+    state: usize,
+}
+
+impl Serialize for Row<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.columns.iter().map(|column| match column {
+            Column::Numbers(numbers) => Entry::Number(numbers[self.state]),
+            Column::Counts(counts) => Entry::Count(counts[self.state]),
+            Column::Flags(flags) => Entry::Flag(flags[self.state]),
+            Column::Rolls(rolls) => Entry::Rolls(rolls[self.state]),
+        }))
+    }
+}
+
 impl Column<'_> {
     /// Returns the approximate length as JSON.
     pub(super) const fn text_bytes(&self) -> usize {
@@ -40,15 +57,6 @@ impl Column<'_> {
             Self::Counts(counts) => 5 * counts.len(),
             Self::Flags(flags) => 6 * flags.len(),
             Self::Rolls(rolls) => 17 * rolls.len(),
-        }
-    }
-
-    const fn entry(&self, state: usize) -> Entry {
-        match self {
-            Self::Numbers(numbers) => Entry::Number(numbers[state]),
-            Self::Counts(counts) => Entry::Count(counts[state]),
-            Self::Flags(flags) => Entry::Flag(flags[state]),
-            Self::Rolls(rolls) => Entry::Rolls(rolls[state]),
         }
     }
 
@@ -95,15 +103,8 @@ impl SweepAnswer {
     }
 
     pub(super) fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let columns = self.columns();
-        let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record(columns.iter().map(|(name, _)| name)).map_err(csv_error)?;
-        let mut row = Vec::with_capacity(columns.len());
-        for state in 0..self.states.tooth.len() {
-            row.clear();
-            row.extend(columns.iter().map(|(_, column)| column.entry(state)));
-            csv.serialize(&row).map_err(csv_error)?;
-        }
-        csv.flush()
+        let (names, columns): (Vec<_>, Vec<_>) = self.columns().into_iter().unzip();
+        let rows = (0..self.states.tooth.len()).map(|state| Row { columns: &columns, state });
+        write_csv(&names, rows, writer)
     }
 }

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use toothwave_solver::sweep::Extremes;
+
 use crate::findings::write_findings;
 use crate::json::word;
 use crate::sweep::answer::SweepAnswer;
@@ -21,13 +23,9 @@ impl SweepAnswer {
         writeln!(writer, "torque balance residual             {:.1e}", self.checks.torque_balance_residual)?;
         writeln!(writer, "period closure residual             {:.1e}", self.checks.period_closure_residual)?;
         writeln!(writer, "\npeak                              value   input angle      position")?;
-        let contacts = [
-            ("wave generator", &self.peaks.wave_generator),
-            ("ring", &self.peaks.ring),
-            ("carrier", &self.peaks.carrier),
-        ];
-        for (name, contact) in contacts {
-            for (quantity, unit, peak) in [("force", "N", &contact.force_n), ("stress", "MPa", &contact.stress_mpa)] {
+        for (contact, peaks) in self.peaks.iter() {
+            let name = contact.to_string().replace('_', " ");
+            for (quantity, unit, peak) in [("force", "N", &peaks.force_n), ("stress", "MPa", &peaks.stress_mpa)] {
                 writeln!(
                     writer,
                     "{name:<14} {quantity:<6} {:>14.3} {unit:<3} {:>9.4} deg {:>9.4} deg",
@@ -51,19 +49,15 @@ impl SweepAnswer {
             fingers.write_text(writer)?;
         }
         if let Some(wind_up) = &self.wind_up {
-            let range = |column: &[f64]| {
-                let least = column.iter().copied().fold(f64::INFINITY, f64::min);
-                (least, column.iter().copied().fold(f64::NEG_INFINITY, f64::max))
-            };
-            let (least, most) = range(&wind_up.wind_up_deg);
-            let (softest, stiffest) = range(&wind_up.torsional_stiffness_nm_per_rad);
-            let error_deg = wind_up.transmission_error_peak_to_peak_deg;
-            writeln!(writer, "\nwind-up of the input                {least:.6} to {most:.6} deg")?;
+            let Extremes { least, largest } = Extremes::of(&wind_up.wind_up_deg);
+            writeln!(writer, "\nwind-up of the input                {least:.6} to {largest:.6} deg")?;
             if let Some(unloaded_deg) = &wind_up.unloaded_wind_up_deg {
-                let (least, most) = range(unloaded_deg);
-                writeln!(writer, "the same without load               {least:.6} to {most:.6} deg")?;
+                let Extremes { least, largest } = Extremes::of(unloaded_deg);
+                writeln!(writer, "the same without load               {least:.6} to {largest:.6} deg")?;
             }
-            writeln!(writer, "torsional stiffness at the output   {softest:.6e} to {stiffest:.6e} N·m/rad")?;
+            let Extremes { least, largest } = Extremes::of(&wind_up.torsional_stiffness_nm_per_rad);
+            writeln!(writer, "torsional stiffness at the output   {least:.6e} to {largest:.6e} N·m/rad")?;
+            let error_deg = wind_up.transmission_error_peak_to_peak_deg;
             writeln!(writer, "transmission error, peak to peak    {error_deg:.3e} deg")?;
             if let Some(error_deg) = wind_up.unloaded_transmission_error_peak_to_peak_deg {
                 writeln!(writer, "the same without load               {error_deg:.3e} deg")?;

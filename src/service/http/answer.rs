@@ -90,7 +90,7 @@ async fn answer_request<Q: Question>(
     request: Request,
 ) -> Result<Response, Problem> {
     let DocumentRequest { headers, body, representation } = DocumentRequest::read::<Q>(&app, deadline, request).await?;
-    let hash = RequestHash::new(question.name(), representation, &body);
+    let hash = RequestHash::new(&question.name(), representation, &body);
     let known = app.cache.key(hash).and_then(|key| app.cache.get(key).map(|answer| (key, answer)));
     let (key, answer, status) = match known {
         Some((key, answer)) => (key, answer, CacheStatus::Hit),

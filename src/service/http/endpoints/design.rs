@@ -82,8 +82,8 @@ impl Question for WholeDesign {
     type Checked = CheckedDesign;
     type Answer = DesignAnswer;
 
-    fn name(&self) -> &'static str {
-        "design"
+    fn name(&self) -> String {
+        "design".into()
     }
 
     fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {

@@ -101,7 +101,7 @@ impl Deviating {
         let (slots, spaces) = (p.installed.unsigned_abs(), p.ring_teeth.unsigned_abs());
         let direction_rad =
             |item: u64, of: u64, angle_deg: f64| 2.0 * PI * item as f64 / of as f64 - angle_deg.to_radians();
-        let runout = &deviations.runout;
+        let runout = deviations.runout();
         let amount_mm = PerContact::of(|contact| MM_PER_UM * runout.get(contact).amount_um);
         let slot = |slot| {
             let thinner_mm = MM_PER_UM * of(&deviations.tooth_radius_um, slot);
