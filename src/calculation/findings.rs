@@ -40,20 +40,6 @@ const TIP_RADIUS: &str = "/drive/ring/tip_radius_mm";
 const WIDTH: &str = "/drive/teeth/width_mm";
 const LOAD: &str = "/load";
 
-/// Text of a finding without its numbers, and the fields that it points at.
-struct Text {
-    pointers: Vec<String>,
-    unit: &'static str,
-    detail: String,
-    advice: String,
-}
-
-/// Returns a text about these fields, which [`Text::says`] completes.
-fn at(pointers: &[&str], unit: &'static str) -> Text {
-    let pointers = pointers.iter().map(|&pointer| pointer.into()).collect();
-    Text { pointers, unit, detail: String::new(), advice: String::new() }
-}
-
 /// Properties of a document that select the text of a finding.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Causes {
@@ -70,22 +56,19 @@ pub(crate) struct Causes {
 }
 
 impl FindingAnswer {
-    /// Creates a finding about this drive. It names only fields that the document has.
-    pub(crate) fn new(finding: &Finding, drive: &Drive, causes: Causes) -> Self {
-        let Text { pointers, unit, detail, advice } = Text::of(finding, drive, causes);
-        let Finding { code, severity, value, limit, .. } = *finding;
-        Self { code, severity, pointers, value, limit, unit: unit.into(), detail, advice }
-    }
-}
-
-impl Text {
     fn says(self, detail: impl Into<String>, advice: impl Into<String>) -> Self {
         Self { detail: detail.into(), advice: advice.into(), ..self }
     }
 
-    fn of(finding: &Finding, drive: &Drive, causes: Causes) -> Self {
+    /// Creates a finding about this drive. It names only fields that the document has.
+    pub(crate) fn new(finding: &Finding, drive: &Drive, causes: Causes) -> Self {
         use FindingCode as Code;
         let Finding { code, severity, value, limit, contact } = *finding;
+        // A finding about these fields, without its text.
+        let at = |pointers: &[&str], unit: &str| {
+            let (pointers, unit) = (pointers.iter().map(|&pointer| pointer.into()).collect(), unit.into());
+            Self { code, severity, pointers, value, limit, unit, detail: String::new(), advice: String::new() }
+        };
         let is_grave = severity == Severity::Warning;
         let parameters = drive.parameters();
         let shaping = parameters.wave_generator.size_and_shape().map(|size| size.to_string());

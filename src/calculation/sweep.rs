@@ -93,11 +93,6 @@ impl CheckedSweep {
         self.duty.hardest()
     }
 
-    /// Returns the deviations of its single items.
-    pub const fn deviations(&self) -> &Deviations {
-        &self.deviations
-    }
-
     /// Returns the same sweep without wear and bearing life.
     pub fn without_wear(self) -> Self {
         let losses = self.losses.map(|losses| LossParameters { wear_rate_mm3_per_nm: None, bearing: None, ..losses });

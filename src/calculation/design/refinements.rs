@@ -69,24 +69,16 @@ pub enum RefinementItem {
     CornerContact,
 }
 
-impl RefinementsDocument {
-    fn items(&self) -> impl Iterator<Item = RefinementItem> {
-        let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.listed;
-        let items = [
-            (self.auto, RefinementItem::Auto),
-            (ring_teeth_bend, RefinementItem::RingTeethBend),
-            (wave_generator_moves, RefinementItem::WaveGeneratorMoves),
-            (corner_contact, RefinementItem::CornerContact),
-        ];
-        items.into_iter().filter_map(|(is_there, item)| is_there.then_some(item))
-    }
+impl RefinementItem {
+    const ALL: [Self; 4] = [Self::Auto, Self::RingTeethBend, Self::WaveGeneratorMoves, Self::CornerContact];
 
-    fn add(&mut self, item: RefinementItem) {
-        match item {
-            RefinementItem::Auto => self.auto = true,
-            RefinementItem::RingTeethBend => self.listed.ring_teeth_bend = true,
-            RefinementItem::WaveGeneratorMoves => self.listed.wave_generator_moves = true,
-            RefinementItem::CornerContact => self.listed.corner_contact = true,
+    /// Returns the place that tells whether the refinements include the item.
+    const fn of(self, refinements: &mut RefinementsDocument) -> &mut bool {
+        match self {
+            Self::Auto => &mut refinements.auto,
+            Self::RingTeethBend => &mut refinements.listed.ring_teeth_bend,
+            Self::WaveGeneratorMoves => &mut refinements.listed.wave_generator_moves,
+            Self::CornerContact => &mut refinements.listed.corner_contact,
         }
     }
 }
@@ -96,7 +88,10 @@ impl Serialize for RefinementsDocument {
         match (self.listed == Refinements::NONE, self.auto) {
             (true, true) => serializer.serialize_str(AUTO),
             (true, false) => serializer.serialize_str(NONE),
-            (false, _) => serializer.collect_seq(self.items()),
+            (false, _) => {
+                let mut refinements = *self;
+                serializer.collect_seq(RefinementItem::ALL.into_iter().filter(|item| *item.of(&mut refinements)))
+            }
         }
     }
 }
@@ -126,8 +121,8 @@ impl<'de> Deserialize<'de> for RefinementsDocument {
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Self::Value, A::Error> {
                 let mut refinements = RefinementsDocument::only(Refinements::NONE);
-                while let Some(item) = items.next_element()? {
-                    refinements.add(item);
+                while let Some(item) = items.next_element::<RefinementItem>()? {
+                    *item.of(&mut refinements) = true;
                 }
                 Ok(refinements)
             }

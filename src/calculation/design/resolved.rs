@@ -185,22 +185,15 @@ impl Design {
         }
     }
 
-    /// Returns the default contact law: the most accurate one, or the paper's law with the paper's compatibility.
-    fn law_by_default(&self) -> StiffnessDocument {
-        match (&self.drive.teeth, self.model.compatibility) {
-            (TeethDocument::Ball(_), _) => StiffnessDocument::Hertz(HertzDocument::default()),
-            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), Compatibility::Projection) => {
-                StiffnessDocument::Linear(LinearDocument::default())
-            }
-            (TeethDocument::Cylinder(_) | TeethDocument::FlatSided(_), Compatibility::VirtualWork) => {
-                StiffnessDocument::Johnson(JohnsonDocument::default())
-            }
-        }
-    }
-
-    /// Returns the contact law with all its values.
+    /// Returns the contact law with all its values. By default it is the most accurate one, or the paper's law with the
+    /// paper's compatibility.
     pub fn stiffness(&self) -> StiffnessDocument {
-        let mut stiffness = self.model.stiffness.clone().unwrap_or_else(|| self.law_by_default());
+        let by_default = || match (&self.drive.teeth, self.model.compatibility) {
+            (TeethDocument::Ball(_), _) => StiffnessDocument::Hertz(HertzDocument::default()),
+            (_, Compatibility::Projection) => StiffnessDocument::Linear(LinearDocument::default()),
+            (_, Compatibility::VirtualWork) => StiffnessDocument::Johnson(JohnsonDocument::default()),
+        };
+        let mut stiffness = self.model.stiffness.clone().unwrap_or_else(by_default);
         stiffness.fill_in(self.drive.teeth.counted().radius_mm);
         stiffness
     }

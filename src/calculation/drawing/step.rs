@@ -155,13 +155,10 @@ impl Step<'_> {
         let representation =
             self.record(format_args!("ADVANCED_BREP_SHAPE_REPRESENTATION('{name}',({origin},{solid}),{UNITS})"))?;
         let colour = self.record(format_args!("COLOUR_RGB('',{},{},{})", Real(red), Real(green), Real(blue)))?;
-        let mut style = self.record(format_args!("FILL_AREA_STYLE_COLOUR('',{colour})"))?;
-        for (kind, arguments) in
-            [("FILL_AREA_STYLE", "'',("), ("SURFACE_STYLE_FILL_AREA", ""), ("SURFACE_SIDE_STYLE", "'',(")]
-        {
-            let end = if arguments.is_empty() { "" } else { ")" };
-            style = self.record(format_args!("{kind}({arguments}{style}{end})"))?;
-        }
+        let style = self.record(format_args!("FILL_AREA_STYLE_COLOUR('',{colour})"))?;
+        let style = self.record(format_args!("FILL_AREA_STYLE('',({style}))"))?;
+        let style = self.record(format_args!("SURFACE_STYLE_FILL_AREA({style})"))?;
+        let style = self.record(format_args!("SURFACE_SIDE_STYLE('',({style}))"))?;
         let usage = self.record(format_args!("SURFACE_STYLE_USAGE(.BOTH.,{style})"))?;
         let assignment = self.record(format_args!("PRESENTATION_STYLE_ASSIGNMENT(({usage}))"))?;
         let styled = self.record(format_args!("STYLED_ITEM('colour',({assignment}),{solid})"))?;
