@@ -290,9 +290,9 @@ impl Mesh {
         })
     }
 
-    /// Returns the place of a tooth by its initial distance in slots from lobe 0 and its lobe, both counted on over
-    /// turns.
-    fn place(&self, slot: u64, lobe: u64) -> Place {
+    /// Returns the place of the tooth that started `slot` slots from lobe 0 and is pushed by the lobe with this number,
+    /// counted backwards, both counted on over turns. The ring space is `l = m i - s u`, modulo the ring's teeth.
+    pub fn place(&self, slot: u64, lobe: u64) -> Place {
         let spaces = self.removal * slot % self.ring_teeth;
         let turned = lobe % self.ring_teeth;
         let ring_space = if self.is_forward { spaces + self.ring_teeth - turned } else { spaces + turned };

@@ -317,7 +317,7 @@ fn deviating_teeth_of_both_zones_share_load() {
         for lobe in 0..zones {
             for placed in mesh.placed_at(1, Samples::new(4).unwrap()) {
                 // The teeth of the second lobe are half a turn away.
-                let place = Place::new(&drive, placed.number + 14 * lobe, lobe);
+                let place = Mesh::new(&drive).place(placed.number + 14 * lobe, lobe);
                 teeth.push(loaded.tooth_at(&place, placed.position)?);
             }
         }
@@ -380,7 +380,7 @@ fn ring_space_follows_from_slot_and_lobe() {
                 if !(0.0..0.5 * PI).contains(&position) {
                     continue;
                 }
-                let space = Place::new(&drive, slot, lobe).ring_space;
+                let space = Mesh::new(&drive).place(slot, lobe).ring_space;
                 let middle = in_ring + s * position / k;
                 let off = (middle - 2.0 * PI * space as f64 / p.ring_teeth as f64).rem_euclid(2.0 * PI);
                 assert!(off.min(2.0 * PI - off) < 1e-12, "slot {slot}, lobe {lobe}: {off}");

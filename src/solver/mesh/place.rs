@@ -1,7 +1,5 @@
 //! Places of teeth in the slots and on the lobes.
 
-use super::Mesh;
-use crate::drive::Drive;
 use crate::position::Position;
 
 /// Numbers of teeth over the input angle: of one zone if the zones are alike, otherwise and with `deviations` of all
@@ -38,14 +36,6 @@ pub struct Place {
     pub ring_space: u64,
     /// Lobe of the wave generator that pushes the tooth.
     pub lobe: u64,
-}
-
-impl Place {
-    /// Returns the place of the tooth that started `slot` slots from lobe 0 and is pushed by the lobe with this number,
-    /// counted backwards. The ring space is `l = m i - s u`, modulo the ring's teeth.
-    pub fn new(drive: &Drive, slot: u64, lobe: u64) -> Self {
-        Mesh::new(drive).place(slot, lobe)
-    }
 }
 
 /// Teeth in neighbouring slots on one lobe. The distance of their places is the number of laps in a load period.
