@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use toothwave_solver::backing::{Backings, Shares};
+use toothwave_solver::backing::Backings;
 use toothwave_solver::drive::Draft;
 use toothwave_solver::mesh::Samples;
 use toothwave_solver::model_error::{self, Beyond, ModelError};
@@ -232,8 +232,8 @@ impl Converged {
     fn new(checked: &CheckedAccuracy, load: &LoadCase, stop: &dyn Stop) -> Result<Self, SolveError> {
         let CheckedAccuracy { drive, deviations, backings, max_states, .. } = checked;
         let sweep = sweep_with_deviations(drive, load, deviations, Points::finest(*max_states), stop)?;
-        let shares = Shares::of(drive, load, backings, &sweep.peaks);
-        let parts = Some((backings, shares.as_ref()));
+        let shared = backings.shared_estimates(drive, load.parameters(), &sweep.peaks);
+        let parts = Some((backings, shared.as_deref()));
         let ModelError { measured, beyond, .. } = model_error::of(drive, load, deviations, &sweep, parts)?;
         let is_like = beyond.iter().all(|reason| matches!(reason, Beyond::Law));
         let expected_error = measured.filter(|_| is_like).map(|measured| measured.force.largest());

@@ -71,7 +71,7 @@ impl FindingAnswer {
         };
         let is_grave = severity == Severity::Warning;
         let parameters = drive.parameters();
-        let shaping = parameters.wave_generator.size_and_shape().map(|size| size.to_string());
+        let shaping = parameters.wave_generator.size_and_shape().map(|(parameter, _)| parameter.to_string());
         let [size, shape] = [0, 1].map(|at| shaping[at].as_str());
         let (lobe, rounder) = match parameters.wave_generator {
             WaveGenerator::Ellipse { .. } => ("the major axis", "the ellipse rounder"),

@@ -14,7 +14,7 @@ mod states;
 mod text;
 
 use serde::Serialize;
-use toothwave_solver::backing::{Backings, Shares};
+use toothwave_solver::backing::Backings;
 use toothwave_solver::fingers::CarrierFingers;
 use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, LossParameters, LossTotals, PointLosses};
 use toothwave_solver::losses::{Mechanism, period};
@@ -30,10 +30,8 @@ use crate::forms::{Form, Format, Forms};
 use crate::no_answer::{NoAnswer, NoAnswerCode, too_many};
 use crate::question::{Limits, Question, checked_drive, checked_load, require_finite};
 use crate::sweep::answer::{ChecksAnswer, LoadAnswer, StatesAnswer, SweepAnswer, WindUpAnswer};
-use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::{DutyAnswer, DutyPointAnswer};
-use crate::sweep::fingers::FingersAnswer;
-use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
+use crate::sweep::losses::LossesAnswer;
 
 pub use states::Column;
 
@@ -102,9 +100,8 @@ impl CheckedSweep {
     /// Returns the share that a finger of the carrier adds to a tooth's approach at its contacts, at the peaks of the
     /// load. None without an estimate.
     pub fn finger_share(&self, peaks: &PerContact<solver::ContactPeaks>) -> Option<f64> {
-        let shares = Shares::of(&self.drive, self.load(), &self.backings, peaks)?.shares;
-        let of_finger = shares.into_iter().find(|(estimate, _)| estimate.backing.contact() == Contact::Carrier);
-        of_finger.map(|(_, share)| share)
+        let estimates = self.backings.shared_estimates(&self.drive, self.load().parameters(), peaks)?;
+        estimates.into_iter().filter(|estimate| estimate.contact == Contact::Carrier).find_map(|finger| finger.share)
     }
 
     /// Returns the loss totals over all points of a duty, given the sweep of the hardest; none without friction.
@@ -143,7 +140,8 @@ impl CheckedSweep {
     }
 
     fn solve_at(&self, points: Points, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
-        self.limited(|load| solver::sweep_with_deviations(&self.drive, load, &self.deviations, points, stop))
+        let run = |load: &LoadCase| solver::sweep_with_deviations(&self.drive, load, &self.deviations, points, stop);
+        self.limited(run, |sweep| &mut sweep.torque_capacity)
     }
 
     /// Solves for the peaks only. Stresses are means along the teeth.
@@ -151,7 +149,8 @@ impl CheckedSweep {
         if !self.deviations.is_nil() {
             return Ok((&self.solve(stop)?).into());
         }
-        self.limited(|load| solver::peaks(&self.drive, load, self.points, stop))
+        let run = |load: &LoadCase| solver::peaks(&self.drive, load, self.points, stop);
+        self.limited(run, |peaks| &mut peaks.torque_capacity)
     }
 }
 
@@ -275,8 +274,8 @@ impl Question for Sweep {
         let mesh = sweep.mesh;
         let peaks = fingers.as_ref().map_or(sweep.peaks, |fingers| fingers.peaks_along(&sweep.peaks));
         let finger_stress = checked.finger_stress(&sweep.peaks);
-        let shares = Shares::of(drive, load, backings, &sweep.peaks);
-        let parts = Some((backings, shares.as_ref()));
+        let shared = backings.shared_estimates(drive, load.parameters(), &sweep.peaks);
+        let parts = Some((backings, shared.as_deref()));
         let mut found = Vec::from_iter(findings::of_wind_up(drive, load, &sweep));
         found.extend(findings::of_half_widths(drive, load, &sweep.states, checked.load_peak_over_mean()));
         go_on()?;
@@ -293,9 +292,11 @@ impl Question for Sweep {
             }
             None => None,
         };
-        let radial_force_n = forces.map(|forces| RadialForceAnswer::new(&sweep, forces)).transpose()?;
+        if let Some(forces) = &forces {
+            require_finite([&forces.force_n, &forces.direction_deg])?;
+        }
         found.extend(findings::of_projection(drive, load)?);
-        found.extend(shares.iter().flat_map(findings::of_backing));
+        found.extend(shared.iter().flat_map(|estimates| findings::of_backing(estimates)));
         let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();
         found.extend(findings::of_contacts(drive, load, &peaks, approaches_matter));
         found.extend(finger_stress.as_ref().and_then(findings::of_fingers));
@@ -334,13 +335,13 @@ impl Question for Sweep {
                 .map(|backlash| WindUpAnswer::new(drive, &sweep, backlash, unloaded_wind_up_deg))
                 .transpose()?,
             torque_capacity: sweep.torque_capacity,
-            fingers: fingers.as_ref().zip(finger_stress.as_ref()).map(|(of, stress)| FingersAnswer::new(of, stress)),
+            fingers: finger_stress,
             duty: duty_answer,
             losses,
-            radial_force_n,
+            radial_force_n: forces,
             model: checked.model.clone(),
             model_error,
-            series_compliance_estimates: EstimateAnswer::all(backings, drive, load, shares.as_ref()),
+            series_compliance_estimates: shared.unwrap_or_else(|| backings.estimates(drive, load.parameters())),
             checks: ChecksAnswer {
                 torque_balance_residual: sweep.torque_balance_residual,
                 period_closure_residual: sweep.period_closure_residual,

@@ -9,7 +9,7 @@ use crate::contact_law::ContactLaw;
 use crate::drive::{Draft, Drive, ToothShape};
 use crate::fingers::{CarrierFingers, FingerBeam, FingerParameters, Fingers};
 use crate::gaps::MM_PER_UM;
-use crate::load_sharing::{LoadCase, LoadParameters};
+use crate::load_sharing::LoadParameters;
 use crate::parts::{CarrierPart, PartsParameters, RIM};
 use crate::root::NotConverged;
 use crate::sweep::ContactPeaks;
@@ -68,7 +68,7 @@ impl Backing {
     }
 
     /// True if parts with this support include it.
-    pub const fn is_of(self, support: &Support) -> bool {
+    const fn is_of(self, support: &Support) -> bool {
         match self {
             Self::CamOnBore => true,
             Self::HousedRim => matches!(support.rim, Rim::Housed),
@@ -81,13 +81,22 @@ impl Backing {
     }
 }
 
-/// Estimated compliance behind a contact.
+/// Estimated compliance of a part behind a contact (docs/explanation/theory.md section 4.10).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), schema(as = EstimateAnswer))]
 pub struct Estimate {
-    /// Compliant part.
+    /// The contact.
+    pub contact: Contact,
+    /// Compliant part behind the contact.
     pub backing: Backing,
     /// Additional displacement of the contact per newton, beyond the depth that the contact's law includes.
     pub compliance_mm_per_n: f64,
+    /// True if this support is the one in `parts`, or the default if `parts` does not specify it.
+    pub is_as_held: bool,
+    /// Share that it adds to the approach of a tooth at its three contacts, for cylinders with this support under
+    /// `johnson`. Left out if the design gives a series compliance there.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
+    pub share: Option<f64>,
 }
 
 /// Ring rim beyond its tooth spaces, as a curved strip in plane strain.
@@ -255,7 +264,8 @@ impl Backings {
         Ok(CarrierFingers::new(drive, beam, parameters, p)?.load_peak_over_mean())
     }
 
-    /// Returns the estimates. The deflection within the depth that a contact's law includes belongs to the law.
+    /// Returns the estimates, without shares. The deflection within the depth that a contact's law includes belongs to
+    /// the law.
     pub fn estimates(&self, drive: &Drive, p: &LoadParameters) -> Vec<Estimate> {
         let counted_mm = |contact| counted_depth_mm(drive, &p.law, contact);
         let held = |strip: Option<HeldStrip>, contact: Contact| {
@@ -275,41 +285,25 @@ impl Backings {
         .into_iter()
         // A wall of nearly zero thickness has infinite compliance.
         .filter_map(|(backing, compliance)| Some((backing, compliance.filter(|compliance| compliance.is_finite())?)))
-        .map(|(backing, compliance_mm_per_n)| Estimate { backing, compliance_mm_per_n })
+        .map(|(backing, compliance_mm_per_n)| Estimate {
+            contact: backing.contact(),
+            backing,
+            compliance_mm_per_n,
+            is_as_held: backing.is_of(&self.support),
+            share: None,
+        })
         .collect()
     }
 
-    /// Returns the estimates for the actual support as series compliance; zero where there is none.
-    pub fn series_compliance_mm_per_n(&self, drive: &Drive, p: &LoadParameters) -> PerContact<f64> {
-        let estimates = self.estimates(drive, p);
-        PerContact::of(|contact| {
-            let is_held =
-                |&&Estimate { backing, .. }: &&Estimate| backing.contact() == contact && backing.is_of(&self.support);
-            estimates.iter().find(is_held).map_or(0.0, |estimate| estimate.compliance_mm_per_n)
-        })
-    }
-}
-
-/// Returns the depth below a contact that its law includes in the approach: the law's own, otherwise the tooth's
-/// radius.
-fn counted_depth_mm(drive: &Drive, law: &ContactLaw, contact: Contact) -> f64 {
-    let tooth_radius_mm = drive.parameters().tooth_radius_mm;
-    law.depth_mm(tooth_radius_mm).map_or(tooth_radius_mm, |depth_mm| *depth_mm.get(contact))
-}
-
-/// Estimates relative to the contact deflection, for line contacts with their own law.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Shares {
-    /// Estimates for the drive's support, each with the share that it adds to a tooth's approach at its own contacts.
-    pub shares: Vec<(Estimate, f64)>,
-}
-
-impl Shares {
-    /// Returns the shares at the peaks of a load under the logarithmic law. None for teeth that are not cylinders, or
-    /// under other laws, whose own error is as large. A contact with a given series compliance already includes its
-    /// backing.
-    pub fn of(drive: &Drive, load: &LoadCase, backings: &Backings, peaks: &PerContact<ContactPeaks>) -> Option<Self> {
-        let p = load.parameters();
+    /// Returns the estimates with their shares at the peaks of a load under the logarithmic law. None for teeth that are
+    /// not cylinders, or under other laws, whose own error is as large. A contact with a given series compliance already
+    /// includes its backing.
+    pub fn shared_estimates(
+        &self,
+        drive: &Drive,
+        p: &LoadParameters,
+        peaks: &PerContact<ContactPeaks>,
+    ) -> Option<Vec<Estimate>> {
         let is_line = matches!(drive.parameters().tooth, ToothShape::Cylinder { .. });
         if !is_line || p.law.depth_mm(drive.parameters().tooth_radius_mm).is_none() {
             return None;
@@ -327,26 +321,31 @@ impl Shares {
         if !(own_mm_per_n.is_finite() && own_mm_per_n > 0.0) {
             return None;
         }
-        let shares = backings
-            .estimates(drive, p)
-            .into_iter()
-            .filter(|estimate| {
-                let is_given = *p.series_compliance_mm_per_n.get(estimate.backing.contact()) > 0.0;
-                !is_given && estimate.backing.is_of(&backings.support)
-            })
-            .map(|estimate| {
-                let ratio = squared_ratio.get(estimate.backing.contact());
-                (estimate, ratio * estimate.compliance_mm_per_n / own_mm_per_n)
-            })
-            .collect();
-        Some(Self { shares })
+        let mut estimates = self.estimates(drive, p);
+        for Estimate { contact, compliance_mm_per_n, is_as_held, share, .. } in &mut estimates {
+            let is_given = *p.series_compliance_mm_per_n.get(*contact) > 0.0;
+            if *is_as_held && !is_given {
+                *share = Some(squared_ratio.get(*contact) * *compliance_mm_per_n / own_mm_per_n);
+            }
+        }
+        Some(estimates)
     }
 
-    /// Returns the wind-up error if all of them are neglected: `1/(1 + Σ) - 1`.
-    pub fn wind_up_error(&self) -> f64 {
-        let sum: f64 = self.shares.iter().map(|(_, share)| share).sum();
-        -sum / (1.0 + sum)
+    /// Returns the estimates for the actual support as series compliance; zero where there is none.
+    pub fn series_compliance_mm_per_n(&self, drive: &Drive, p: &LoadParameters) -> PerContact<f64> {
+        let estimates = self.estimates(drive, p);
+        PerContact::of(|contact| {
+            let is_held = |estimate: &&Estimate| estimate.contact == contact && estimate.is_as_held;
+            estimates.iter().find(is_held).map_or(0.0, |estimate| estimate.compliance_mm_per_n)
+        })
     }
+}
+
+/// Returns the depth below a contact that its law includes in the approach: the law's own, otherwise the tooth's
+/// radius.
+fn counted_depth_mm(drive: &Drive, law: &ContactLaw, contact: Contact) -> f64 {
+    let tooth_radius_mm = drive.parameters().tooth_radius_mm;
+    law.depth_mm(tooth_radius_mm).map_or(tooth_radius_mm, |depth_mm| *depth_mm.get(contact))
 }
 
 /// Returns a contact's own approach divided by its force, by the logarithmic law (docs/explanation/theory.md section

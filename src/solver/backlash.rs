@@ -24,46 +24,26 @@ const MARGIN: f64 = 1e-9;
 /// Number of intervals in a piece. It is even because each cell has two.
 const INTERVALS: usize = 32;
 
-/// Backlash of the carrier over the input angle.
+/// Backlash at the output: rotation of the carrier from one flank to the other, with wave generator and ring held and
+/// without load. It follows from the gaps alone, because the parts are rigid here.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), schema(as = BacklashAnswer))]
 #[non_exhaustive]
 pub struct Backlash {
-    /// Mean backlash.
-    pub mean_rad: f64,
-    /// Smallest backlash; parts interfere if it is negative.
-    pub smallest: BacklashAt,
-    /// Largest backlash.
-    pub largest: BacklashAt,
-    /// Contribution of each contact's gaps to the mean; the contributions add up to it.
-    pub contribution_rad: PerContact<f64>,
-}
-
-impl Backlash {
-    /// Returns the mean in arcmin.
-    pub fn mean_arcmin(&self) -> f64 {
-        arcmin(self.mean_rad)
-    }
-
-    /// Returns the contributions to the mean in arcmin.
-    pub fn contribution_arcmin(&self) -> PerContact<f64> {
-        PerContact::of(|contact| arcmin(*self.contribution_rad.get(contact)))
-    }
-}
-
-/// Backlash at one input angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BacklashAt {
-    /// Backlash of the carrier.
-    pub backlash_rad: f64,
-    /// Input angle of this backlash.
-    pub input_angle_deg: f64,
-}
-
-impl BacklashAt {
-    /// Returns the backlash of the carrier in arcmin.
-    pub fn backlash_arcmin(&self) -> f64 {
-        arcmin(self.backlash_rad)
-    }
+    /// Mean over the input angle, in arcmin.
+    pub mean_arcmin: f64,
+    /// Smallest value over the input angle, in arcmin. Parts interfere if it is below zero.
+    pub smallest_arcmin: f64,
+    /// Input angle of the smallest value.
+    #[cfg_attr(feature = "document", serde(skip))]
+    pub smallest_at_deg: f64,
+    /// Largest value over the input angle, in arcmin.
+    pub largest_arcmin: f64,
+    /// Input angle of the largest value.
+    #[cfg_attr(feature = "document", serde(skip))]
+    pub largest_at_deg: f64,
+    /// Contribution of the gaps of each contact to the mean, in arcmin. The sum is the mean.
+    pub contribution_arcmin: PerContact<f64>,
 }
 
 fn arcmin(rad: f64) -> f64 {
@@ -84,7 +64,7 @@ fn arcmin(rad: f64) -> f64 {
 /// })
 /// .unwrap();
 /// let backlash = backlash::of(&drive, &load, &Deviations::default(), &Never).unwrap();
-/// assert!((backlash.mean_arcmin() - 6.266).abs() < 5e-4);
+/// assert!((backlash.mean_arcmin - 6.266).abs() < 5e-4);
 /// ```
 ///
 /// # Errors
@@ -104,48 +84,44 @@ pub fn of(drive: &Drive, load: &LoadCase, deviations: &Deviations, stop: &dyn St
     }
     let laps = flanks.laps as f64;
     let contribution_rad = PerContact::of(|contact| *found.integral_rad.get(contact) / laps);
-    let at = |(laps_passed, backlash_rad): (f64, f64)| BacklashAt {
-        backlash_rad,
-        input_angle_deg: laps_passed * flanks.lap_deg(),
-    };
+    let at = |(laps_passed, backlash_rad): (f64, f64)| (laps_passed * flanks.lap_deg(), arcmin(backlash_rad));
+    let (smallest_at_deg, smallest_arcmin) = at(found.smallest);
+    let (largest_at_deg, largest_arcmin) = at(found.largest);
     Ok(Backlash {
-        mean_rad: sum(&contribution_rad),
-        smallest: at(found.smallest),
-        largest: at(found.largest),
-        contribution_rad,
+        mean_arcmin: arcmin(sum(&contribution_rad)),
+        smallest_arcmin,
+        smallest_at_deg,
+        largest_arcmin,
+        largest_at_deg,
+        contribution_arcmin: PerContact::of(|contact| arcmin(*contribution_rad.get(contact))),
     })
 }
 
-/// Returns the contribution of each contact's gaps to the backlash at an input angle. Their sum is the backlash there,
-/// see [`of`].
+/// Returns the backlash at an input angle, see [`of`].
 ///
 /// # Errors
 /// The errors of [`of`], except interference.
-pub fn at(
+pub fn arcmin_at(
     drive: &Drive,
     load: &LoadCase,
     deviations: &Deviations,
     input_angle_deg: f64,
-) -> Result<PerContact<f64>, SolveError> {
+) -> Result<f64, SolveError> {
     let mirrored = mirrored(deviations);
     let flanks = Flanks::new(drive, load, deviations, &mirrored)?;
     let laps_passed = (input_angle_deg / flanks.lap_deg()).rem_euclid(flanks.laps as f64);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, far below 2^53")]
     let lap = (laps_passed as u64).min(flanks.laps - 1);
     let fraction = (laps_passed - lap as f64).clamp(MARGIN, 1.0 - MARGIN);
-    let first = |side: Side| -> Result<_, SolveError> {
-        let mut first: Option<PerContact<f64>> = None;
+    let first_rad = |side: Side| {
         let fraction = side.fraction(fraction);
-        for tooth in flanks.teeth(side.lap(lap, flanks.laps), flanks.places(fraction)) {
-            let closing_rad = flanks.closing_rad(side, &tooth, &flanks.lever(tooth.spacings, fraction)?);
-            if first.is_none_or(|first| sum(&closing_rad) < sum(&first)) {
-                first = Some(closing_rad);
-            }
-        }
-        first.ok_or(SolveError::NoLeverArm)
+        let teeth = flanks.teeth(side.lap(lap, flanks.laps), flanks.places(fraction));
+        teeth.iter().try_fold(f64::INFINITY, |first_rad, tooth| {
+            let lever = flanks.lever(tooth.spacings, fraction)?;
+            Ok::<_, SolveError>(first_rad.min(sum(&flanks.closing_rad(side, tooth, &lever))))
+        })
     };
-    let (front, behind) = (first(Side::Front)?, first(Side::Behind)?);
-    Ok(PerContact::of(|contact| front.get(contact) + behind.get(contact)))
+    Ok(arcmin(first_rad(Side::Front)? + first_rad(Side::Behind)?))
 }
 
 fn sum(of_contacts: &PerContact<f64>) -> f64 {

@@ -14,13 +14,13 @@ use crate::findings::{self, Finding};
 use crate::gaps::RAD_PER_ARCSEC;
 pub use crate::outline::{Edge, Outline, SPLINE_SHARE_OF_CHORD, Section};
 use crate::outline::{POINTS_PER_CHORD, chords, ends_of_chords};
-use crate::parts::{CarrierPart, PartsParameters, RingPart, ToothPart, WaveGeneratorPart};
+use crate::parts::{CarrierPart, MadePart, PartsParameters};
 use crate::profile::{
-    Density, Extent, Polyline, ProfileParameters, SampledCurve, cam_half_lobe, cam_outline, direction, expected_points,
+    Density, Extent, ProfileParameters, SampledCurve, cam_half_lobe, cam_half_lobes, direction, expected_points,
 };
 use crate::root::NotConverged;
 use crate::spline;
-use crate::tooth_space::HalfSpace;
+use crate::tooth_space::{HalfSpace, ToothSpace};
 use crate::violation::{Parameter, Violation};
 use crate::{SolveError, Stop};
 
@@ -102,14 +102,6 @@ pub struct Drawing {
     parameters: DrawingParameters,
 }
 
-#[derive(Debug, Clone, PartialEq)]
-enum MadePart {
-    Ring(Box<RingPart>),
-    Carrier(CarrierPart),
-    Teeth(ToothPart),
-    WaveGenerator(WaveGeneratorPart),
-}
-
 impl Drawing {
     /// Checks the parameters of the subject.
     ///
@@ -141,15 +133,8 @@ impl Drawing {
             return Err(DriveError::Impossible(violations));
         };
         let carrier_rotation_rad = RAD_PER_ARCSEC * parts.modification.carrier_rotation_arcsec;
-        let made = |part: &Part| {
-            Ok(match part {
-                Part::Ring => MadePart::Ring(Box::new(RingPart::new(&drive, parts)?)),
-                Part::Carrier => MadePart::Carrier(CarrierPart::new(&drive, parts)),
-                Part::Teeth => MadePart::Teeth(ToothPart::new(&drive, parts)),
-                Part::WaveGenerator => MadePart::WaveGenerator(WaveGeneratorPart::new(parts)),
-            })
-        };
-        let parts = subject.parts().iter().map(made).collect::<Result<_, DriveError>>()?;
+        let made = subject.parts().iter().map(|&part| MadePart::new(part, &drive, parts));
+        let parts = made.collect::<Result<_, DriveError>>()?;
         Ok(Self { drive, parts, carrier_rotation_rad, subject, parameters: *parameters })
     }
 
@@ -163,23 +148,17 @@ impl Drawing {
     /// # Errors
     /// [`NotConverged`] from the geometry.
     pub fn findings(&self) -> Result<Vec<Finding>, NotConverged> {
-        let of_part = |part: &MadePart| match part {
-            MadePart::Ring(ring) => Ok(findings::of_ring(&self.drive, ring)),
-            MadePart::Carrier(carrier) => findings::of_carrier(&self.drive, carrier),
-            MadePart::Teeth(_) => Ok(Vec::new()),
-            MadePart::WaveGenerator(cam) => Ok(findings::of_wave_generator(&self.drive, cam)),
-        };
-        let findings: Vec<_> = self.parts.iter().map(of_part).collect::<Result<_, NotConverged>>()?;
-        Ok(findings.concat())
+        let of_parts = self.parts.iter().map(|part| findings::of_made_part(&self.drive, part));
+        Ok(of_parts.collect::<Result<Vec<_>, NotConverged>>()?.concat())
     }
 
     /// Returns the approximate number of curve points. The true number is at least this, and may be several times
     /// larger.
     pub fn expected_points(&self) -> u64 {
         let has_curves = |part: &MadePart| match part {
-            MadePart::Ring(_) => true,
-            MadePart::WaveGenerator(cam) => self.cam_circle(cam).is_none(),
-            MadePart::Carrier(_) | MadePart::Teeth(_) => false,
+            MadePart::Ring { .. } => true,
+            MadePart::WaveGenerator { set_back_mm, .. } => self.cam_circle(*set_back_mm).is_none(),
+            MadePart::Carrier(_) | MadePart::Teeth { .. } => false,
         };
         if !self.parts.iter().any(has_curves) {
             return 0;
@@ -197,24 +176,34 @@ impl Drawing {
     }
 
     fn body(&self, part: &MadePart, stop: &dyn Stop) -> Result<Body, SolveError> {
-        let (part, section) = match part {
-            MadePart::Ring(ring) => (Part::Ring, self.ring_section(ring, stop)?),
-            MadePart::WaveGenerator(cam) => (Part::WaveGenerator, self.cam_section(cam, stop)?),
-            MadePart::Carrier(carrier) => (Part::Carrier, self.carrier_section(carrier)),
-            MadePart::Teeth(tooth) => (Part::Teeth, tooth_section(tooth)),
+        let (part, outer, holes) = match part {
+            MadePart::Ring { space, outer_radius_mm } => {
+                let holes = vec![Outline::Edges(self.ring_edges(space, stop)?)];
+                (Part::Ring, Outline::circle(*outer_radius_mm), holes)
+            }
+            MadePart::WaveGenerator { set_back_mm, bore_radius_mm } => {
+                let outer = match self.cam_circle(*set_back_mm) {
+                    Some(circle) => circle,
+                    None => Outline::Edges(self.cam_edges(*set_back_mm, stop)?),
+                };
+                (Part::WaveGenerator, outer, bore_radius_mm.map(Outline::circle).into_iter().collect())
+            }
+            MadePart::Carrier(carrier) => (Part::Carrier, Outline::Edges(finger(&self.drive, carrier)), Vec::new()),
+            MadePart::Teeth { radius_mm, half_width_mm } => {
+                (Part::Teeth, tooth_outline(*radius_mm, *half_width_mm), Vec::new())
+            }
         };
-        Ok(Body { part, section, placements: self.placements(part)? })
+        Ok(Body { part, section: Section { outer, holes }, placements: self.placements(part)? })
     }
 
-    /// Returns the section of the ring: a circle outside, tooth spaces from tip to tip inside. Bored or rotated flanks
-    /// leave lands between these.
-    fn ring_section(&self, ring: &RingPart, stop: &dyn Stop) -> Result<Section, SolveError> {
+    /// Returns the edges of the ring's tooth spaces, from tip to tip. Bored or rotated flanks leave lands between these.
+    fn ring_edges(&self, made: &ToothSpace, stop: &dyn Stop) -> Result<Vec<Edge>, SolveError> {
         let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
-        let mut half = ring.space.half(self.density(), stop)?;
+        let mut half = made.half(self.density(), stop)?;
         let chords: usize = half.pieces.iter().map(|piece| chords(&piece.points)).sum();
         self.require_points(2 * chords as u64 * teeth)?;
         let tip_rad = PI / teeth as f64;
-        let tip = ring.space.tip();
+        let tip = made.tip();
         if !tip.has_land
             && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
         {
@@ -241,87 +230,63 @@ impl Drawing {
                 None => {}
             }
         }
-        Ok(Section { outer: Outline::circle(ring.outer_radius_mm), holes: vec![Outline::Edges(edges)] })
-    }
-
-    /// Returns the section of the wave generator: an eccentric circle, or a curve between all lobes and valleys.
-    fn cam_section(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Section, SolveError> {
-        let outer = match self.cam_circle(cam) {
-            Some(circle) => circle,
-            None => Outline::Edges(self.cam_edges(cam, stop)?),
-        };
-        Ok(Section { outer, holes: cam.bore_radius_mm.map(Outline::circle).into_iter().collect() })
+        Ok(edges)
     }
 
     /// Returns the outline of an eccentric with its lobe along x.
-    fn cam_circle(&self, cam: &WaveGeneratorPart) -> Option<Outline> {
+    fn cam_circle(&self, set_back_mm: f64) -> Option<Outline> {
         match self.drive.flank().locus().cam() {
             Cam::Harmonic(harmonic) if harmonic.is_circle() => Some(Outline::Circle {
                 center: Point2::new(harmonic.amplitude_mm(), 0.0),
-                radius_mm: harmonic.mean_radius_mm() - cam.set_back_mm,
+                radius_mm: harmonic.mean_radius_mm() - set_back_mm,
             }),
             _ => None,
         }
     }
 
-    fn cam_edges(&self, cam: &WaveGeneratorPart, stop: &dyn Stop) -> Result<Vec<Edge>, SolveError> {
+    /// Returns the edges of a cam between all lobes and valleys.
+    fn cam_edges(&self, set_back_mm: f64, stop: &dyn Stop) -> Result<Vec<Edge>, SolveError> {
         let (locus, lobes) = (self.drive.flank().locus(), self.drive.lobes());
-        let half_lobe = cam_half_lobe(locus, cam.set_back_mm, self.density(), stop)?;
+        let half_lobe = cam_half_lobe(locus, set_back_mm, self.density(), stop)?;
         let half = chords(&half_lobe.points);
         self.require_points(u64::from(2 * lobes) * half as u64)?;
+        let tolerance_mm = self.parameters.chord_tolerance_mm;
         let points = ends_of_chords(&half_lobe.points);
-        let whole = cam_outline(&points, lobes);
-        // The same for the control points: the last of each polygon is the first of the next, so that they start and
-        // end exactly at the outline's points.
-        let polygons = spline::polygons(&half_lobe, SPLINE_SHARE_OF_CHORD * self.parameters.chord_tolerance_mm);
+        // The last pole of each polygon is the first of the next.
+        let polygons = spline::polygons(&half_lobe, SPLINE_SHARE_OF_CHORD * tolerance_mm);
+        let poles = points[..1].iter().chain(polygons.iter().flat_map(|polygon| &polygon[1..])).copied().collect();
         let degrees: Vec<_> = polygons.iter().map(|polygon| polygon.len() - 1).collect();
-        let poles = polygons.iter().flat_map(|polygon| &polygon[1..]);
-        let whole_polygon = cam_outline(&points[..1].iter().chain(poles).copied().collect(), lobes);
+        let arcs = arcs::arcs(&half_lobe, tolerance_mm);
+        let corners = arcs.iter().map(|arc| arc.point).chain(half_lobe.points.last().copied()).collect();
+        // The angles of an arc are equal from both ends.
+        let bulges: Vec<_> = arcs.iter().map(|arc| arc.bulge).collect();
+        let [points, poles, corners] = [points, poles, corners].map(|half| cam_half_lobes(&half, lobes));
         // At a lobe or a valley the tangent is perpendicular to the radius.
         let across = |end: u32| {
             let radial = direction(end, 2 * lobes);
             Unit::new_unchecked(Vector2::new(0.0 - radial.y, radial.x))
         };
-        let mut first_pole = 0;
-        let mut polynomials = |index: u32| {
-            let mut degrees = degrees.clone();
+        let edges = (0..2 * lobes).zip(points.into_iter().zip(poles.iter().zip(&corners))).map(|(index, half)| {
+            let (points, (poles, corners)) = half;
+            let (mut degrees, mut bulges) = (degrees.clone(), bulges.clone());
             if index % 2 == 1 {
                 degrees.reverse();
-            }
-            let polygon = |degree: usize| {
-                let first = first_pole;
-                first_pole += degree;
-                whole_polygon[first..=first_pole].to_vec()
-            };
-            degrees.into_iter().map(polygon).collect()
-        };
-        // The same for the arcs, whose angles are equal from both ends.
-        let half_arcs = arcs::arcs(&half_lobe, self.parameters.chord_tolerance_mm);
-        let corners: Polyline = half_arcs.iter().map(|arc| arc.point).chain(half_lobe.points.last().copied()).collect();
-        let whole_corners = cam_outline(&corners, lobes);
-        let arcs = |index: u32, first: usize| {
-            let mut bulges: Vec<_> = half_arcs.iter().map(|arc| arc.bulge).collect();
-            if index % 2 == 1 {
                 bulges.reverse();
             }
-            let arc = |(point, bulge): (&Point2<f64>, f64)| ArcStart { point: *point, bulge };
-            whole_corners[first..].iter().zip(bulges).map(arc).collect()
-        };
-        let starts = (0..).step_by(half).zip((0..).step_by(half_arcs.len()));
-        let edges = (0..2 * lobes).zip(starts).map(|(index, (start, first_arc))| Edge::Curve {
-            points: whole[start..=start + half].to_vec(),
-            start_tangent: across(index),
-            end_tangent: across((index + 1) % (2 * lobes)),
-            polynomials: polynomials(index),
-            arcs: arcs(index, first_arc),
+            let mut last = 0;
+            let polygon = |degree: usize| {
+                last += degree;
+                poles[last - degree..=last].to_vec()
+            };
+            Edge::Curve {
+                points,
+                start_tangent: across(index),
+                end_tangent: across((index + 1) % (2 * lobes)),
+                polynomials: degrees.into_iter().map(polygon).collect(),
+                arcs: corners.iter().zip(bulges).map(|(&point, bulge)| ArcStart { point, bulge }).collect(),
+            }
         });
         Ok(edges.collect())
-    }
-
-    /// Returns one finger of the carrier, between slot 0, along x, and slot 1. It is pointed if the slots overlap
-    /// beyond the inner radius.
-    fn carrier_section(&self, carrier: &CarrierPart) -> Section {
-        Section { outer: Outline::Edges(finger(&self.drive, carrier)), holes: Vec::new() }
     }
 
     /// Returns the placements of a part's prisms: in the ring's frame for an assembly, otherwise in its own. The
@@ -415,10 +380,9 @@ fn flanks(half: HalfSpace) -> Vec<SampledCurve> {
     curves
 }
 
-/// Returns the section of a tooth: a circle, or two arcs joined by flats parallel to its slot, which is along x.
-fn tooth_section(tooth: &ToothPart) -> Section {
-    let ToothPart { radius_mm, half_width_mm } = *tooth;
-    let outer = if half_width_mm < radius_mm {
+/// Returns the outline of a tooth: a circle, or two arcs joined by flats parallel to its slot, which is along x.
+fn tooth_outline(radius_mm: f64, half_width_mm: f64) -> Outline {
+    if half_width_mm < radius_mm {
         let half_length_mm = ((radius_mm - half_width_mm) * (radius_mm + half_width_mm)).sqrt();
         let corner = |x: f64, y: f64| Point2::new(x * half_length_mm, y * half_width_mm);
         let arc =
@@ -432,8 +396,7 @@ fn tooth_section(tooth: &ToothPart) -> Section {
         ])
     } else {
         Outline::circle(radius_mm)
-    };
-    Section { outer, holes: Vec::new() }
+    }
 }
 
 /// Returns the finger between slots 0 and 1 of the widest possible carrier: from the cam's major axis to the ring's
@@ -442,7 +405,8 @@ pub fn widest_finger(drive: &Drive) -> Option<Vec<Edge>> {
     CarrierPart::widest(drive).map(|carrier| finger(drive, &carrier))
 }
 
-/// Returns a finger of the carrier, between the walls of slots 0 and 1.
+/// Returns a finger of the carrier, between the walls of slot 0, along x, and slot 1. It is pointed if the slots overlap
+/// beyond the inner radius.
 fn finger(drive: &Drive, carrier: &CarrierPart) -> Vec<Edge> {
     let CarrierPart { inner_radius_mm, outer_radius_mm, slot_half_width_mm: wall } = *carrier;
     let half_spacing_rad = PI / drive.parameters().installed as f64;

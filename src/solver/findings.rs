@@ -6,9 +6,8 @@ mod made_parts;
 use FindingCode as Code;
 
 use crate::SolveError;
-use crate::backing::{Backing, Estimate, Shares};
+use crate::backing::{Backing, Estimate};
 use crate::backlash::Backlash;
-use crate::cam::Hollow;
 use crate::contact::Contact;
 use crate::drive::{Drive, ToothShape};
 use crate::fingers::FingerStress;
@@ -21,7 +20,7 @@ use crate::sweep::Sweep;
 
 pub(crate) use contacts::widest_half_widths_mm;
 pub use contacts::{of_contacts, of_half_widths};
-pub(crate) use made_parts::{of_carrier, of_ring, of_wave_generator};
+pub(crate) use made_parts::of_made_part;
 
 /// Contact stress at the fatigue limit of bearing steel (ISO 281:2007).
 pub const FATIGUE_LIMIT_STRESS_MPA: f64 = 1500.0;
@@ -170,6 +169,16 @@ impl Finding {
         Self { severity: Severity::Info, ..Self::warning(code, value, limit) }
     }
 
+    /// Creates a warning if a value exceeds its limit.
+    fn above(code: FindingCode, value: f64, limit: f64) -> Option<Self> {
+        (value > limit).then_some(Self::warning(code, value, limit))
+    }
+
+    /// Creates a warning if a value is less than its limit.
+    fn below(code: FindingCode, value: f64, limit: f64) -> Option<Self> {
+        (value < limit).then_some(Self::warning(code, value, limit))
+    }
+
     const fn at(self, contact: Contact) -> Self {
         Self { contact: Some(contact), ..self }
     }
@@ -221,39 +230,25 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
         }
         Some(_) | None => {}
     }
-    let min = Mesh::new(drive).teeth_in_mesh().min;
-    if min < 2 {
-        #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
-        findings.push(Finding::warning(Code::FewTeethInMesh, min as f64, 2.0));
-    }
-    let slot_wall_mm = drive.slot_wall_mm();
-    let limit_mm = THIN_WALL_SHARE_OF_SLOT * 2.0 * drive.slot_half_width_mm();
-    if slot_wall_mm < limit_mm {
-        findings.push(Finding::warning(Code::ThinSlotWall, slot_wall_mm, limit_mm));
-    }
+    #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
+    let least_in_mesh = Mesh::new(drive).teeth_in_mesh().min as f64;
+    findings.extend(Finding::below(Code::FewTeethInMesh, least_in_mesh, 2.0));
+    findings.extend(Finding::below(Code::ThinSlotWall, drive.slot_wall_mm(), thin_wall_mm(drive)));
     let innermost_mm = flank.locus().at(limit.position)?.center_radius_mm;
     let cam_outer_mm = drive.cam_outer_radius_mm();
-    if innermost_mm < cam_outer_mm {
-        findings.push(Finding::warning(Code::ToothBeyondCarrier, innermost_mm, cam_outer_mm));
-    }
+    findings.extend(Finding::below(Code::ToothBeyondCarrier, innermost_mm, cam_outer_mm));
     let outermost_mm = cam_outer_mm + p.tooth_radius_mm;
-    if outermost_mm > drive.tip_radius_mm() {
-        findings.push(Finding::warning(Code::ToothBeyondCarrier, outermost_mm, drive.tip_radius_mm()));
-    }
+    findings.extend(Finding::above(Code::ToothBeyondCarrier, outermost_mm, drive.tip_radius_mm()));
     let tan_pressure_angle = drive.steepest_engaged()?.tan_pressure_angle * flank.teeth_per_wave();
     let pressure_angle_deg = tan_pressure_angle.atan().to_degrees();
-    if pressure_angle_deg > STEEP_FLANK_DEG {
-        findings.push(Finding::warning(Code::SteepRingFlank, pressure_angle_deg, STEEP_FLANK_DEG));
-    }
-    if let Some(Hollow { amplitude_mm, limit_mm }) = flank.locus().cam().kind().hollow() {
+    findings.extend(Finding::above(Code::SteepRingFlank, pressure_angle_deg, STEEP_FLANK_DEG));
+    if let Some((amplitude_mm, limit_mm)) = flank.locus().cam().kind().hollow() {
         findings.push(Finding::info(Code::HollowWaveGenerator, amplitude_mm, limit_mm));
     }
     if let ToothShape::FlatSided { flat_length_mm, .. } = p.tooth {
         // The arcs beside the flats reach the contact with the ring if w/2 ≥ r sin β, that is, l ≤ 2r cos β.
         let limit_mm = 2.0 * p.tooth_radius_mm / tan_pressure_angle.hypot(1.0);
-        if flat_length_mm > limit_mm {
-            findings.push(Finding::warning(Code::FlatCutsTheContact, flat_length_mm, limit_mm));
-        }
+        findings.extend(Finding::above(Code::FlatCutsTheContact, flat_length_mm, limit_mm));
     }
     Ok(findings)
 }
@@ -269,21 +264,19 @@ pub fn of_projection(drive: &Drive, load: &LoadCase) -> Result<Vec<Finding>, Not
     }
     let mut findings = Vec::new();
     let pressure_angle_deg = drive.largest_pressure_angle_deg()?;
-    if pressure_angle_deg > STEEP_FOR_PROJECTION_DEG {
-        let limit_deg = STEEP_FOR_PROJECTION_DEG;
+    let limit_deg = STEEP_FOR_PROJECTION_DEG;
+    if pressure_angle_deg > limit_deg {
         findings.push(Finding::info(Code::ProjectionOnSteepFlank, pressure_angle_deg, limit_deg));
     }
     let gap_um = p.clearance_um.iter().fold(0.0, |most: f64, (_, &gap_um)| most.max(gap_um));
-    if gap_um > 0.0 {
-        findings.push(Finding::warning(Code::ProjectionWithGap, gap_um, 0.0));
-    }
+    findings.extend(Finding::above(Code::ProjectionWithGap, gap_um, 0.0));
     Ok(findings)
 }
 
 /// Returns findings for parts behind the contacts that are too compliant to neglect.
-pub fn of_backing(shares: &Shares) -> Vec<Finding> {
-    let soft = shares.shares.iter().filter(|(_, share)| *share > SOFT_BACKING_SHARE);
-    let finding = |&(estimate, share): &(Estimate, f64)| {
+pub fn of_backing(estimates: &[Estimate]) -> Vec<Finding> {
+    let finding = |estimate: &Estimate| {
+        let share = estimate.share.filter(|&share| share > SOFT_BACKING_SHARE)?;
         let (code, is_grave) = match estimate.backing {
             Backing::FingerAtOneEnd | Backing::FingerOnWeb => (Code::SlenderFingers, true),
             Backing::FingerAtBothEnds | Backing::FingerJoinedAtFarEnd => (Code::SlenderFingers, false),
@@ -293,13 +286,12 @@ pub fn of_backing(shares: &Shares) -> Vec<Finding> {
         };
         Some(Finding::grave_if(code, share, SOFT_BACKING_SHARE, is_grave))
     };
-    soft.filter_map(finding).collect()
+    estimates.iter().filter_map(finding).collect()
 }
 
 /// Returns a finding if the carrier's fingers have a safety below 1.
 pub fn of_fingers(stress: &FingerStress) -> Option<Finding> {
-    let least = stress.safety?.least();
-    (least < 1.0).then_some(Finding::warning(Code::FingerOverstressed, least, 1.0))
+    Finding::below(Code::FingerOverstressed, stress.safety?, 1.0)
 }
 
 /// Returns a finding if the wind-up of a sweep exceeds the model's range.
@@ -311,21 +303,18 @@ pub fn of_wind_up(drive: &Drive, load: &LoadCase, sweep: &Sweep) -> Option<Findi
     } else {
         WIND_UP_SHARE_OF_PERIOD * Mesh::new(drive).period_deg()
     };
-    (wind_up_deg > limit_deg).then_some(Finding::warning(Code::WindUpBeyondModel, wind_up_deg, limit_deg))
+    Finding::above(Code::WindUpBeyondModel, wind_up_deg, limit_deg)
 }
 
 /// Returns a finding for unloaded interference on both flanks. If a tooth is blocked on a lobe or in a valley, the
 /// finding names the ring. Its value is then the gap in µm instead of the backlash in arcmin.
 pub fn of_backlash(backlash: &Result<Backlash, SolveError>) -> Option<Finding> {
     match *backlash {
-        Ok(Backlash { smallest, .. }) => {
-            let smallest_arcmin = smallest.backlash_arcmin();
-            (smallest_arcmin < -ROUNDING_ARCMIN).then_some(Finding::warning(
-                Code::NegativeBacklash,
-                smallest_arcmin,
-                0.0,
-            ))
-        }
+        Ok(Backlash { smallest_arcmin, .. }) => (smallest_arcmin < -ROUNDING_ARCMIN).then_some(Finding::warning(
+            Code::NegativeBacklash,
+            smallest_arcmin,
+            0.0,
+        )),
         Err(SolveError::Interference { gap_um, .. }) => {
             Some(Finding::warning(Code::NegativeBacklash, gap_um, 0.0).at(Contact::Ring))
         }
@@ -355,8 +344,12 @@ pub fn of_friction(mechanism: &Mechanism, friction: &Friction, loss_ratio: f64) 
 /// Returns a finding if the load on a bearing of this rating exceeds the range of its life equation
 /// (docs/explanation/theory.md section 10.5).
 pub fn of_bearing(dynamic_load_rating_n: f64, load_n: f64) -> Option<Finding> {
-    let limit_n = LIFE_HOLDS_TO_SHARE_OF_RATING * dynamic_load_rating_n;
-    (load_n > limit_n).then_some(Finding::warning(Code::BearingLoadAboveHalfRating, load_n, limit_n))
+    Finding::above(Code::BearingLoadAboveHalfRating, load_n, LIFE_HOLDS_TO_SHARE_OF_RATING * dynamic_load_rating_n)
+}
+
+/// Returns the thickness below which a wall is thin.
+fn thin_wall_mm(drive: &Drive) -> f64 {
+    THIN_WALL_SHARE_OF_SLOT * 2.0 * drive.slot_half_width_mm()
 }
 
 /// Returns `r_g` if teeth are balls and this contact has a groove for them.

@@ -7,7 +7,6 @@ mod overhang;
 mod strength;
 
 pub use beam::{FOOT_IN_DISC, FingerBeam, Fingers};
-pub use capacity::Limited;
 pub use overhang::{Overhang, slice_compliance_mm2_per_n};
 pub use strength::{LoadCycle, Safety, Strength, stress_concentration};
 
@@ -15,7 +14,8 @@ use crate::contact::{Contact, HertzLine, PerContact};
 use crate::drive::{Drive, ToothShape};
 use crate::load_sharing::LoadParameters;
 use crate::root::NotConverged;
-use crate::sweep::{ContactPeaks, States, SweepPeaks};
+use crate::sweep::{ContactPeaks, States};
+use crate::tooth::Pressure;
 use crate::tooth::flat::FlatContact;
 
 /// Radius of the fillet at a finger's foot over the finger's thickness, if it is not given.
@@ -54,52 +54,40 @@ pub struct CarrierFingers {
     moment_nmm_per_n: f64,
     /// Moment at the foot for each newton metre at the carrier, which the ring at the far ends adds.
     moment_nmm_per_nm: f64,
-    slot: SlotStress,
+    /// Pressure at the slot's wall, before an uneven load. The wall supports a flat over its whole length.
+    slot: Pressure,
 }
 
-/// Stress of the slot's contact for a force, before an uneven load.
+/// Strength of the carrier's fingers, under the largest force of a tooth (docs/explanation/theory.md section 4.12).
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum SlotStress {
-    Line {
-        hertz: HertzLine,
-        curvature_per_mm: f64,
-    },
-    /// A flat that the wall supports over its whole length.
-    Flat(FlatContact),
-}
-
-impl SlotStress {
-    fn of(drive: &Drive, p: &LoadParameters) -> Self {
-        let width_mm = drive.tooth_width_mm();
-        match drive.parameters().tooth {
-            ToothShape::FlatSided { flat_length_mm, .. } => Self::Flat(FlatContact::new(flat_length_mm, width_mm)),
-            ToothShape::Cylinder { .. } | ToothShape::Ball { .. } => Self::Line {
-                hertz: HertzLine::new(&p.materials, Contact::Carrier, width_mm),
-                curvature_per_mm: 1.0 / drive.parameters().tooth_radius_mm,
-            },
-        }
-    }
-
-    fn stress_mpa(&self, force_n: f64) -> f64 {
-        match self {
-            Self::Line { hertz, curvature_per_mm } => hertz.stress_mpa(force_n, *curvature_per_mm),
-            Self::Flat(flat) => flat.stress_mpa(force_n),
-        }
-    }
-}
-
-/// Stress at the foot of the finger with the largest force.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), schema(as = FingersAnswer))]
 #[non_exhaustive]
 pub struct FingerStress {
-    /// Moment at the foot.
+    /// Support of the fingers.
+    pub fingers: Fingers,
+    /// Thickness of a finger across the slots, at the middle of its height, in mm.
+    pub thickness_mm: f64,
+    /// Height of a finger along the radius, in mm.
+    pub height_mm: f64,
+    /// Radius of the fillet at its foot, in mm.
+    pub fillet_radius_mm: f64,
+    /// Largest load per length along a tooth over its mean. Contact stresses grow with its square root.
+    pub load_peak_over_mean: f64,
+    /// Bending moment at the foot, in N·mm.
     pub moment_nmm: f64,
-    /// Stress without the notch.
-    pub nominal_mpa: f64,
-    /// Largest stress in the fillet.
-    pub largest_mpa: f64,
-    /// Safety, given a strength.
-    pub safety: Option<Safety>,
+    /// Bending stress without the notch, in MPa.
+    pub nominal_stress_mpa: f64,
+    /// Largest stress in the fillet, in MPa.
+    pub stress_mpa: f64,
+    /// The lesser of both safeties. Only with `parts.carrier.strength`.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
+    pub safety: Option<f64>,
+    /// Safety against yield, or against breaking if the material is hardened. Only with `parts.carrier.strength`.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
+    pub yield_safety: Option<f64>,
+    /// Safety against fatigue. Only with `parts.carrier.strength`.
+    #[cfg_attr(feature = "document", serde(skip_serializing_if = "Option::is_none"))]
+    pub fatigue_safety: Option<f64>,
 }
 
 impl CarrierFingers {
@@ -117,7 +105,7 @@ impl CarrierFingers {
     /// let backings = Backings::of(&drive, &draft, &PartsParameters::default(), Support::default());
     /// let beam = *backings.finger().unwrap();
     /// let fingers = CarrierFingers::new(&drive, beam, FingerParameters::default(), &load).unwrap();
-    /// assert!(fingers.stress(1000.0, 280.0).largest_mpa > 0.0);
+    /// assert!(fingers.stress(1000.0, 280.0).stress_mpa > 0.0);
     /// ```
     ///
     /// # Errors
@@ -150,7 +138,14 @@ impl CarrierFingers {
             Fingers::FarEndsJoined => 1e3 * length_mm / 4.0 / (beam.count as f64 * mean_center_radius_mm(drive)),
             Fingers::HeldAtOneEnd | Fingers::HeldAtBothEnds | Fingers::WebInTheMiddle => 0.0,
         };
-        let slot = SlotStress::of(drive, p);
+        let width_mm = drive.tooth_width_mm();
+        let slot = match drive.parameters().tooth {
+            ToothShape::FlatSided { flat_length_mm, .. } => Pressure::Flat(FlatContact::new(flat_length_mm, width_mm)),
+            ToothShape::Cylinder { .. } | ToothShape::Ball { .. } => Pressure::Line {
+                hertz: HertzLine::new(&p.materials, Contact::Carrier, width_mm),
+                curvature_per_mm: 1.0 / drive.parameters().tooth_radius_mm,
+            },
+        };
         Ok(Self { beam, parameters, overhang, moment_nmm_per_n, moment_nmm_per_nm, slot })
     }
 
@@ -159,13 +154,7 @@ impl CarrierFingers {
         &self.beam
     }
 
-    /// Returns the support.
-    pub const fn fingers(&self) -> Fingers {
-        self.parameters.fingers
-    }
-
-    /// Returns the radius of the fillet at the foot.
-    pub fn fillet_radius_mm(&self) -> f64 {
+    fn fillet_radius_mm(&self) -> f64 {
         self.parameters.fillet_radius_mm.unwrap_or(FILLET_SHARE_OF_THICKNESS * self.beam.thickness_mm)
     }
 
@@ -196,11 +185,19 @@ impl CarrierFingers {
         let moment_nmm = self.moment_nmm_per_n * force_n + self.moment_nmm_per_nm * output_torque_nm;
         let (nominal_mpa, concentration) = (self.nominal_mpa_per_nmm() * moment_nmm, self.concentration());
         let safety = |strength: Strength| strength.safety(self.parameters.cycle, nominal_mpa, concentration);
+        let safety = self.parameters.strength.map(safety);
         FingerStress {
+            fingers: self.parameters.fingers,
+            thickness_mm: self.beam.thickness_mm,
+            height_mm: self.beam.height_mm,
+            fillet_radius_mm: self.fillet_radius_mm(),
+            load_peak_over_mean: self.load_peak_over_mean(),
             moment_nmm,
-            nominal_mpa,
-            largest_mpa: concentration * nominal_mpa,
-            safety: self.parameters.strength.map(safety),
+            nominal_stress_mpa: nominal_mpa,
+            stress_mpa: concentration * nominal_mpa,
+            safety: safety.as_ref().map(Safety::least),
+            yield_safety: safety.map(|safety| safety.yielding),
+            fatigue_safety: safety.map(|safety| safety.fatigue),
         }
     }
 
@@ -209,7 +206,7 @@ impl CarrierFingers {
     pub fn stress_factor(&self, contact: Contact) -> f64 {
         let peak_over_mean = self.load_peak_over_mean();
         match (contact, &self.slot) {
-            (Contact::Carrier, SlotStress::Flat(_)) => peak_over_mean,
+            (Contact::Carrier, Pressure::Flat(_)) => peak_over_mean,
             _ => peak_over_mean.sqrt(),
         }
     }
@@ -228,11 +225,6 @@ impl CarrierFingers {
             }
             peaks
         })
-    }
-
-    /// Returns the summary of a sweep with these peaks.
-    pub fn summary_along(&self, peaks: SweepPeaks) -> SweepPeaks {
-        SweepPeaks { contacts: self.peaks_along(&peaks.contacts), ..peaks }
     }
 
     /// Returns the states with their stresses at the most loaded place along the teeth.

@@ -1,6 +1,6 @@
 //! Path of a tooth's centre over its position ψ (docs/explanation/theory.md section 2).
 
-use crate::cam::{Cam, CamPoint, ToothCenter};
+use crate::cam::{Cam, CurvePoint, ToothCenter};
 use crate::position::{Position, half_lobe_rad};
 use crate::root::NotConverged;
 
@@ -69,7 +69,7 @@ impl Locus {
 
     /// Returns the cam's outline, offset inward along its normal, at a place between the lobe and the valley. Both ends
     /// are exact.
-    pub(crate) fn cam_outline(&self, set_back_mm: f64, place: Position) -> Result<CamPoint, NotConverged> {
+    pub(crate) fn cam_outline(&self, set_back_mm: f64, place: Position) -> Result<CurvePoint, NotConverged> {
         self.cam.kind().outline(self.tooth_radius_mm, set_back_mm, place)
     }
 

@@ -92,9 +92,6 @@ pub struct Turning {
     pub work_nmm_per_rad: PerContact<f64>,
     /// Power lost in the bearing.
     pub bearing_work_nmm_per_rad: f64,
-    /// `M0` of these teeth at their positions: the wave generator's torque without friction, unless its own motion
-    /// under the teeth is included.
-    pub input_torque_nmm: f64,
 }
 
 /// The fixed member.
@@ -140,11 +137,6 @@ impl From<Efficiency> for Efficiencies<f64> {
 }
 
 impl Efficiency {
-    /// Returns `1/(1 + ℓ)` and `1 - ℓ`, ℓ being the loss divided by the power at the driven end.
-    pub fn of_loss(loss_share: f64) -> Self {
-        Self { driven: 1.0 / (1.0 + loss_share), back_driven: 1.0 - loss_share }
-    }
-
     /// True if no torque at the output turns the drive.
     pub fn is_self_locking(&self) -> bool {
         self.back_driven <= 0.0
@@ -224,9 +216,10 @@ impl Mechanism {
         loss_ratio * (f64::from(turns) / f64::from(self.teeth))
     }
 
-    /// Returns the efficiency at a loss ratio ν. Over a period, use the mean ν.
+    /// Returns the efficiencies `1/(1 + ℓ)` and `1 - ℓ` at a loss ratio ν. Over a period, use the mean ν.
     pub fn efficiency(&self, fixed: Fixed, loss_ratio: f64) -> Efficiency {
-        Efficiency::of_loss(self.loss_share(fixed, loss_ratio))
+        let loss_share = self.loss_share(fixed, loss_ratio);
+        Efficiency { driven: 1.0 / (1.0 + loss_share), back_driven: 1.0 - loss_share }
     }
 
     /// Returns `|ω_HS|`, the speed of the wave generator relative to the carrier with the ring fixed: `|ω_H| Z_K/Z_G`.
@@ -259,7 +252,7 @@ impl Mechanism {
         let slips: Vec<_> = teeth.iter().map(|tooth| self.slip_without_spin_mm_per_rad(tooth)).collect();
         let race_mm_per_rad = self.race_mm_per_rad(friction, teeth, &slips);
         let zones = self.zones_in_torque();
-        let (mut work, mut load_n, mut input_torque_nmm) = (PerContact::default(), 0.0, 0.0);
+        let (mut work, mut load_n) = (PerContact::default(), 0.0);
         let mut slipping = Vec::with_capacity(teeth.len());
         for (tooth, slip) in teeth.iter().zip(&slips) {
             let on_race = PerContact { wave_generator: slip.wave_generator - race_mm_per_rad, ..*slip };
@@ -268,7 +261,6 @@ impl Mechanism {
             let taken = |contact| zones * limit_n.get(contact) * slip.slip_mm_per_rad.get(contact).abs();
             work = PerContact::of(|contact| work.get(contact) + taken(contact));
             load_n += zones * tooth.force_n.wave_generator;
-            input_torque_nmm += zones * tooth.force_n.wave_generator * tooth.lever_arm_mm();
             slipping.push(slip);
         }
         Turning {
@@ -276,7 +268,6 @@ impl Mechanism {
             race_mm_per_rad,
             work_nmm_per_rad: work,
             bearing_work_nmm_per_rad: self.bearing_work_nmm_per_rad(friction, load_n, race_mm_per_rad),
-            input_torque_nmm,
         }
     }
 
@@ -342,41 +333,16 @@ impl LoadedTooth {
             force_n,
         }
     }
-
-    /// Returns `|h'| = d sin γ`, the lever arm of `F_H`.
-    pub fn lever_arm_mm(&self) -> f64 {
-        self.center_radius_mm * self.tan_pressure_angle / secant(self.tan_pressure_angle)
-    }
 }
 
-impl Turning {
-    /// Returns the total loss.
-    pub fn lost_nmm_per_rad(&self) -> f64 {
-        self.work_nmm_per_rad.iter().map(|(_, &work)| work).sum::<f64>() + self.bearing_work_nmm_per_rad
-    }
-
-    /// Returns `ν = P/(M0 ω_HS)`.
-    pub fn loss_ratio(&self) -> f64 {
-        self.lost_nmm_per_rad() / self.input_torque_nmm
-    }
-}
-
-/// A quantity at an input angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AtInputAngle {
-    /// The input angle, in any unit.
-    pub input_angle: f64,
-    /// The quantity.
-    pub value: f64,
-}
-
-/// Returns the mean over a period by the trapezoidal rule. The points may be unequally spaced; a jump has two points.
-pub fn mean_over_period(column: &[AtInputAngle]) -> f64 {
+/// Returns the mean over a period by the trapezoidal rule, from input angles in any unit with their values. The angles may
+/// be unequally spaced; a jump has two points.
+pub fn mean_over_period(column: &[(f64, f64)]) -> f64 {
     let (mut area, mut length) = (0.0, 0.0);
     for pair in column.windows(2) {
-        let step = pair[1].input_angle - pair[0].input_angle;
-        area += 0.5 * step * (pair[0].value + pair[1].value);
-        length += step;
+        let [(from, value), (to, next)] = [pair[0], pair[1]];
+        area += 0.5 * (to - from) * (value + next);
+        length += to - from;
     }
     area / length
 }

@@ -5,12 +5,11 @@ mod measured;
 
 use measured::MEASURED;
 
-use crate::backing::{Backing, Backings, Estimate, Rim, Shares, Support};
+use crate::backing::{Backing, Backings, Estimate};
 use crate::contact::{Contact, Material};
 use crate::contact_law::{ContactLaw, LawName, WIDE_SHARE};
 use crate::drive::{Drive, ToothShape};
 use crate::findings::{SOFT_BACKING_SHARE, WIND_UP_SHARE_OF_PERIOD, WIND_UP_TIMES_LOBES_RAD, widest_half_widths_mm};
-use crate::fingers::Fingers;
 use crate::gaps::Deviations;
 use crate::load_sharing::{Compatibility, LoadCase, LoadParameters};
 use crate::mesh::Mesh;
@@ -66,7 +65,7 @@ pub struct ErrorRange {
 }
 
 impl ErrorRange {
-    const fn percent(low: i32, high: i32) -> Self {
+    const fn percent([low, high]: [i32; 2]) -> Self {
         Self { low: low as f64 / 100.0, high: high as f64 / 100.0 }
     }
 
@@ -202,29 +201,27 @@ pub struct Held {
 
 impl Held {
     /// Returns the error for parts that have estimates.
-    fn of(support: &Support, shares: &Shares) -> Option<Self> {
-        if shares.shares.is_empty() {
-            return None;
-        }
-        let has = |wanted: Backing| shares.shares.iter().find(|(estimate, _)| estimate.backing == wanted);
-        let is_soft_finger = |&(estimate, share): &(Estimate, f64)| {
-            estimate.backing.contact() == Contact::Carrier && share > SOFT_BACKING_SHARE
-        };
-        let case = if support.rim == Rim::Free && has(Backing::FreeRim).is_some() {
+    fn of(estimates: &[Estimate]) -> Option<Self> {
+        let shared = || estimates.iter().filter_map(|estimate| Some((estimate, estimate.share?)));
+        shared().next()?;
+        let has = |wanted: Backing| shared().any(|(estimate, _)| estimate.backing == wanted);
+        let case = if has(Backing::FreeRim) {
             HeldCase::FreeRim
-        } else if support.fingers == Fingers::HeldAtOneEnd && has(Backing::FingerAtOneEnd).is_some() {
+        } else if has(Backing::FingerAtOneEnd) {
             HeldCase::FingersAtOneEnd
-        } else if shares.shares.iter().any(is_soft_finger) {
+        } else if shared().any(|(estimate, share)| estimate.contact == Contact::Carrier && share > SOFT_BACKING_SHARE) {
             HeldCase::SlenderFingers
         } else {
             HeldCase::Housed
         };
         let wind_up = match case {
-            HeldCase::Housed => Some(ErrorRange::percent(-25, -20)),
-            HeldCase::FingersAtOneEnd | HeldCase::FreeRim => Some(ErrorRange::percent(-75, -50)),
+            HeldCase::Housed => Some(ErrorRange::percent([-25, -20])),
+            HeldCase::FingersAtOneEnd | HeldCase::FreeRim => Some(ErrorRange::percent([-75, -50])),
             HeldCase::SlenderFingers => None,
         };
-        Some(Self { case, wind_up, estimated_wind_up: shares.wind_up_error() })
+        // If all of them are neglected, the wind-up is that of the contacts alone.
+        let sum: f64 = shared().map(|(_, share)| share).sum();
+        Some(Self { case, wind_up, estimated_wind_up: -sum / (1.0 + sum) })
     }
 }
 
@@ -290,23 +287,19 @@ pub struct ModelError {
     pub beyond: Vec<Beyond>,
 }
 
-/// Measured errors of a case, in per cent.
-struct Row {
-    case: MeasuredCase,
-    /// Errors of force, stress and wind-up.
-    percent: [[i32; 2]; 3],
-}
-
-/// Makes a row. The flags: ring teeth bend, wave generator moves, corner contact; pointed tips, gaps.
+/// Makes a row of the table. The flags: ring teeth bend, wave generator moves, corner contact; pointed tips, gaps. The
+/// errors of force, stress and wind-up are in per cent.
 const fn row(
     compatibility: Compatibility,
     law: LawName,
     refinements: [bool; 3],
     [has_pointed_tips, has_gaps]: [bool; 2],
-    percent: [[i32; 2]; 3],
-) -> Row {
+    [force, stress, wind_up]: [[i32; 2]; 3],
+) -> Measured {
     let case = MeasuredCase::new(compatibility, law, refinements, Case { has_gaps, has_pointed_tips });
-    Row { case, percent }
+    let [force, stress, wind_up] =
+        [ErrorRange::percent(force), ErrorRange::percent(stress), ErrorRange::percent(wind_up)];
+    Measured { case, force, stress, wind_up }
 }
 
 /// Returns the measured errors of a model in such a case, or none if finite elements were not calculated for it.
@@ -316,9 +309,7 @@ pub fn measured(load: &LoadParameters, case: Case) -> Option<Measured> {
     let case = MeasuredCase::new(compatibility, law.name(), refinements, case);
     // Teeth touch corners at pointed tips only.
     let wanted = MeasuredCase { corner_contact: corner_contact && case.has_pointed_tips, ..case };
-    let [force, stress, wind_up] =
-        MEASURED.iter().find(|row| row.case == wanted)?.percent.map(|[low, high]| ErrorRange::percent(low, high));
-    Some(Measured { case, force, stress, wind_up })
+    MEASURED.iter().find(|row| row.case == wanted).map(|row| Measured { case, ..*row })
 }
 
 /// True if the ring's tips are pointed or bored.
@@ -331,7 +322,8 @@ pub fn case_of(drive: &Drive, load: &LoadCase, deviations: &Deviations) -> Case 
     Case { has_gaps: load.has_gaps() || !deviations.is_nil(), has_pointed_tips: has_pointed_tips(drive) }
 }
 
-/// Returns the expected model error for this drive, load and sweep, with these parts and, if known, their shares.
+/// Returns the expected model error for this drive, load and sweep, with these parts and, if known, the shares of
+/// their estimates.
 ///
 /// ```
 /// use toothwave_solver::sweep::{Points, sweep};
@@ -352,7 +344,7 @@ pub fn of(
     load: &LoadCase,
     deviations: &Deviations,
     sweep: &Sweep,
-    parts: Option<(&Backings, Option<&Shares>)>,
+    parts: Option<(&Backings, Option<&[Estimate]>)>,
 ) -> Result<ModelError, NotConverged> {
     let p = load.parameters();
     let case = case_of(drive, load, deviations);
@@ -364,14 +356,15 @@ pub fn of(
     let tooth_radius_mm = drive.parameters().tooth_radius_mm;
     let range = MeasuredRange::of(drive, &p.law, case);
     // Overlapping slots leave no finger to estimate.
-    let has_estimate = |shares: &Shares, contact: Contact| {
+    let has_estimate = |estimates: &[Estimate], contact: Contact| {
         *p.series_compliance_mm_per_n.get(contact) > 0.0
-            || shares.shares.iter().any(|(estimate, _)| estimate.backing.contact() == contact)
+            || estimates.iter().any(|estimate| estimate.contact == contact && estimate.share.is_some())
     };
-    let is_soft = |shares: &Shares| {
-        shares.shares.iter().any(|(_, share)| *share > SOFT_BACKING_SHARE)
-            || ![Contact::Ring, Contact::Carrier].into_iter().all(|contact| has_estimate(shares, contact))
+    let is_soft = |estimates: &[Estimate]| {
+        estimates.iter().any(|estimate| estimate.share > Some(SOFT_BACKING_SHARE))
+            || ![Contact::Ring, Contact::Carrier].into_iter().all(|contact| has_estimate(estimates, contact))
     };
+    let shared = parts.and_then(|(_, shared)| shared);
     // For line contacts the widest is not the one with the largest stress. Flats and the ellipses of balls are known
     // only at their peaks.
     let at_peaks = sweep.peaks.iter().map(|(_, peaks)| peaks.half_width_mm);
@@ -392,10 +385,9 @@ pub fn of(
         (wind_up_deg > range.wind_up_deg, Beyond::WindUp),
         (p.modification.first().is_some() || !deviations.is_nil(), Beyond::Modification),
         (p.series_compliance_mm_per_n.iter().any(|(_, &compliance)| compliance > 0.0), Beyond::SeriesCompliance),
-        (parts.and_then(|(_, shares)| shares).is_some_and(is_soft), Beyond::SoftBacking),
+        (shared.is_some_and(is_soft), Beyond::SoftBacking),
         (widest_mm > range.half_width_over_tooth_radius * tooth_radius_mm, Beyond::HalfWidth),
     ];
     let beyond: Vec<_> = reasons.into_iter().filter(|&(is_beyond, _)| is_beyond).map(|(_, reason)| reason).collect();
-    let held = parts.and_then(|(backings, shares)| Held::of(backings.support(), shares?));
-    Ok(ModelError { measured, held, range, is_within: beyond.is_empty(), beyond })
+    Ok(ModelError { measured, held: shared.and_then(Held::of), range, is_within: beyond.is_empty(), beyond })
 }

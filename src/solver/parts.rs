@@ -48,11 +48,8 @@ pub struct CarrierRadii {
 impl CarrierRadii {
     /// Returns both radii, with defaults for those not given.
     pub(crate) fn of(self, drive: &Drive) -> [f64; 2] {
-        let annulus = Annulus::of(drive);
-        [
-            self.inner_mm.unwrap_or_else(|| annulus.carrier_inner_mm()),
-            self.outer_mm.unwrap_or_else(|| annulus.carrier_outer_mm()),
-        ]
+        let [inner_mm, outer_mm] = Annulus::of(drive).carrier_mm();
+        [self.inner_mm.unwrap_or(inner_mm), self.outer_mm.unwrap_or(outer_mm)]
     }
 
     /// Returns violations if no carrier with these radii fits a cam that is set forward by this amount. It checks as
@@ -237,74 +234,65 @@ impl Annulus {
     /// Returns the annulus as far as the drive is possible.
     fn of_draft(draft: &Draft) -> Option<Self> {
         let ring = draft.ring?;
-        Self::between(ring.flank.locus().cam_outer_radius_mm(), ring.tip_radius_mm)
-    }
-
-    /// Returns the annulus, if there is one.
-    fn between(inner_mm: f64, outer_mm: f64) -> Option<Self> {
-        let annulus = Self { inner_mm, outer_mm };
+        let annulus = Self { inner_mm: ring.flank.locus().cam_outer_radius_mm(), outer_mm: ring.tip_radius_mm };
         (annulus.inner_mm < annulus.outer_mm).then_some(annulus)
     }
 
-    fn play_mm(&self) -> f64 {
-        CARRIER_PLAY * (self.outer_mm - self.inner_mm)
-    }
-
-    fn carrier_inner_mm(&self) -> f64 {
-        self.inner_mm + self.play_mm()
-    }
-
-    fn carrier_outer_mm(&self) -> f64 {
-        self.outer_mm - self.play_mm()
+    /// Returns the carrier's default radii.
+    fn carrier_mm(&self) -> [f64; 2] {
+        let play_mm = CARRIER_PLAY * (self.outer_mm - self.inner_mm);
+        [self.inner_mm + play_mm, self.outer_mm - play_mm]
     }
 }
 
-/// Manufactured ring.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RingPart {
-    pub(crate) space: ToothSpace,
-    pub(crate) outer_radius_mm: f64,
+/// Manufactured part of [`PartsParameters`] that have no violation for the drive.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum MadePart {
+    Ring {
+        space: Box<ToothSpace>,
+        outer_radius_mm: f64,
+    },
+    Carrier(CarrierPart),
+    Teeth {
+        radius_mm: f64,
+        /// Half the width across the slot, less than the radius between flats.
+        half_width_mm: f64,
+    },
+    WaveGenerator {
+        set_back_mm: f64,
+        bore_radius_mm: Option<f64>,
+    },
 }
 
-/// Manufactured wave generator.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WaveGeneratorPart {
-    pub(crate) set_back_mm: f64,
-    pub(crate) bore_radius_mm: Option<f64>,
+impl MadePart {
+    pub(crate) fn new(part: Part, drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
+        let p = parameters;
+        Ok(match part {
+            Part::Ring => {
+                let space = ToothSpace::new(drive, MM_PER_UM * p.ring_clearance_um, &p.modification)?;
+                let outer_radius_mm = p.ring_outer_radius_mm.unwrap_or(RIM * space.outermost_radius_mm());
+                Self::Ring { space: Box::new(space), outer_radius_mm }
+            }
+            Part::Carrier => Self::Carrier(CarrierPart::new(drive, parameters)),
+            Part::Teeth => {
+                let thinner_mm = MM_PER_UM * (p.teeth_clearance_um + p.modification.tooth_radius_um);
+                let radius_mm = drive.parameters().tooth_radius_mm - thinner_mm;
+                Self::Teeth { radius_mm, half_width_mm: drive.slot_half_width_mm() - thinner_mm }
+            }
+            Part::WaveGenerator => {
+                let set_back_um = p.wave_generator_clearance_um + p.modification.wave_generator_equidistant_um;
+                Self::WaveGenerator { set_back_mm: MM_PER_UM * set_back_um, bore_radius_mm: p.bore_radius_mm }
+            }
+        })
+    }
 }
 
 /// Manufactured carrier.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CarrierPart {
+pub(crate) struct CarrierPart {
     pub(crate) inner_radius_mm: f64,
     pub(crate) outer_radius_mm: f64,
     pub(crate) slot_half_width_mm: f64,
-}
-
-/// Manufactured tooth.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ToothPart {
-    pub(crate) radius_mm: f64,
-    /// Half the width across the slot, less than the radius between flats.
-    pub(crate) half_width_mm: f64,
-}
-
-// The parts of [`PartsParameters`] that have no violation for the drive.
-
-impl RingPart {
-    pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Result<Self, DriveError> {
-        let space = ToothSpace::new(drive, MM_PER_UM * parameters.ring_clearance_um, &parameters.modification)?;
-        let outer_radius_mm = parameters.ring_outer_radius_mm.unwrap_or(RIM * space.outermost_radius_mm());
-        Ok(Self { space, outer_radius_mm })
-    }
-}
-
-impl WaveGeneratorPart {
-    pub(crate) fn new(parameters: &PartsParameters) -> Self {
-        let set_back_um =
-            parameters.wave_generator_clearance_um + parameters.modification.wave_generator_equidistant_um;
-        Self { set_back_mm: MM_PER_UM * set_back_um, bore_radius_mm: parameters.bore_radius_mm }
-    }
 }
 
 impl CarrierPart {
@@ -317,26 +305,14 @@ impl CarrierPart {
                 + MM_PER_UM * (parameters.carrier_clearance_um + parameters.modification.slot_wall_um),
         }
     }
-}
 
-impl CarrierPart {
-    /// Returns the carrier without clearance or play, if there is space for one.
+    /// Returns the carrier without clearance or play, if its slots leave one.
     pub(crate) fn widest(drive: &Drive) -> Option<Self> {
-        let Annulus { inner_mm, outer_mm } = Annulus::between(drive.cam_outer_radius_mm(), drive.tip_radius_mm())?;
+        let Annulus { inner_mm, outer_mm } = Annulus::of(drive);
         let slot_half_width_mm = drive.slot_half_width_mm();
         let slots_meet_mm = slot_half_width_mm / (PI / drive.parameters().installed as f64).sin();
         let carrier = Self { inner_radius_mm: inner_mm, outer_radius_mm: outer_mm, slot_half_width_mm };
         (slots_meet_mm < outer_mm).then_some(carrier)
-    }
-}
-
-impl ToothPart {
-    pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
-        let thinner_mm = MM_PER_UM * (parameters.teeth_clearance_um + parameters.modification.tooth_radius_um);
-        Self {
-            radius_mm: drive.parameters().tooth_radius_mm - thinner_mm,
-            half_width_mm: drive.slot_half_width_mm() - thinner_mm,
-        }
     }
 }
 
@@ -369,9 +345,8 @@ impl Checks {
         set_forward_um: f64,
         made_tip_mm: f64,
     ) -> Option<f64> {
-        let inner_mm = annulus.map(|annulus| annulus.carrier_inner_mm());
+        let [inner_mm, outer_mm] = annulus.map_or([None; 2], |annulus| annulus.carrier_mm().map(Some));
         let inner_mm = self.radius_mm(Parameter::CarrierInnerRadius, radii.inner_mm, inner_mm);
-        let outer_mm = annulus.map(|annulus| annulus.carrier_outer_mm());
         let outer_mm = self.radius_mm(Parameter::CarrierOuterRadius, radii.outer_mm, outer_mm);
         if let (Some(inner_mm), Some(a)) = (inner_mm, cam_outer_mm) {
             let limit_mm = a + MM_PER_UM * set_forward_um.max(0.0);

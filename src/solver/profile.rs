@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point2, Rotation2, Unit, Vector2};
 
-use crate::cam::CamPoint;
+use crate::cam::CurvePoint;
 use crate::drive::Drive;
 use crate::locus::Locus;
 use crate::position::{Position, half_lobe_rad};
@@ -54,15 +54,6 @@ pub struct Profiles {
     pub tooth_center_path: Polyline,
     /// The closed wave generator, in its own frame.
     pub wave_generator: Polyline,
-}
-
-/// Point of a curve with its tangent and sign of curvature.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct CurvePoint {
-    pub(crate) point: Point2<f64>,
-    pub(crate) tangent: Unit<Vector2<f64>>,
-    /// Curvature up to a positive factor: its sign changes at an inflection.
-    pub(crate) bend: f64,
 }
 
 /// Sampling density of a curve.
@@ -233,10 +224,8 @@ pub(crate) fn cam_half_lobe(
     stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = locus.lobes();
-    let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, density, stop, |place| {
-        let CamPoint { point, tangent, bend } = locus.cam_outline(clearance_mm, place)?;
-        Ok(CurvePoint { point, tangent, bend })
-    })?;
+    let outline = |place| locus.cam_outline(clearance_mm, place);
+    let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, density, stop, outline)?;
     // The last point is on the valley's line.
     if let Some(last) = curve.points.last_mut() {
         *last = Point2::from(last.coords.norm() * direction(1, 2 * lobes));
@@ -244,27 +233,35 @@ pub(crate) fn cam_half_lobe(
     Ok(curve)
 }
 
-/// Returns the closed wave generator from half a lobe: mirrored at the valley, then rotated from lobe to lobe.
-pub(crate) fn cam_outline(half_lobe: &Polyline, lobes: u32) -> Polyline {
+/// Returns all half lobes of the wave generator from one: mirrored at the valley, then rotated from lobe to lobe. Each
+/// starts exactly at the end of the one before, the first at that of the last.
+pub(crate) fn cam_half_lobes(half_lobe: &Polyline, lobes: u32) -> Vec<Polyline> {
     let pitch = direction(1, lobes);
     // Adding zero turns -0.0 into 0.0.
-    let mirrored = half_lobe
-        .iter()
-        .rev()
-        .skip(1)
-        .map(|p| Point2::new(pitch.x * p.x + pitch.y * p.y + 0.0, pitch.y * p.x - pitch.x * p.y + 0.0));
-    let lobe: Polyline = half_lobe.iter().copied().chain(mirrored).collect();
-    let mut outline = lobe.clone();
-    for turned in 1..lobes {
-        let at = direction(turned, lobes);
-        let next =
-            lobe.iter().skip(1).map(|p| Point2::new(at.x * p.x - at.y * p.y + 0.0, at.y * p.x + at.x * p.y + 0.0));
-        outline.extend(next);
-    }
-    if let Some(last) = outline.last_mut() {
-        *last = half_lobe[0];
-    }
-    outline
+    let mirror =
+        |p: &Point2<f64>| Point2::new(pitch.x * p.x + pitch.y * p.y + 0.0, pitch.y * p.x - pitch.x * p.y + 0.0);
+    let mirrored: Polyline = half_lobe.iter().rev().map(mirror).collect();
+    let mut start = half_lobe[0];
+    let halves = (0..2 * lobes).map(|index| {
+        let half = if index % 2 == 0 { half_lobe } else { &mirrored };
+        let at = direction(index / 2, lobes);
+        let turn = |p: &Point2<f64>| Point2::new(at.x * p.x - at.y * p.y + 0.0, at.y * p.x + at.x * p.y + 0.0);
+        let mut points: Polyline = if index < 2 { half.clone() } else { half.iter().map(turn).collect() };
+        let last = points.len() - 1;
+        points[0] = start;
+        if index + 1 == 2 * lobes {
+            points[last] = half_lobe[0];
+        }
+        start = points[last];
+        points
+    });
+    halves.collect()
+}
+
+/// Returns the closed wave generator from half a lobe.
+fn cam_outline(half_lobe: &Polyline, lobes: u32) -> Polyline {
+    let halves = cam_half_lobes(half_lobe, lobes);
+    half_lobe[..1].iter().chain(halves.iter().flat_map(|half| &half[1..])).copied().collect()
 }
 
 /// Returns the direction at a fraction of a turn, exact on the axes.

@@ -317,10 +317,7 @@ impl RingFlank {
     /// The flank crosses the symmetry line of the ring's tooth at `tan(x/k)(d + r cos β) = r sin β`, `x = π/U - ψ`.
     /// Division by `cos β sin(Ux/2) / k` removes the trivial root `x = 0`. Above the threshold of undercut the other
     /// root grows from 0 like a square root.
-    ///
-    /// # Errors
-    /// [`NotConverged`] if the crossing is not found.
-    pub fn natural_limit(&self) -> Result<FlankLimit, NotConverged> {
+    fn natural_limit(&self) -> Result<FlankLimit, NotConverged> {
         if !self.is_undercut() {
             return Ok(FlankLimit { position: Position::valley(self.locus.lobes()), end: FlankEnd::RegularTip });
         }

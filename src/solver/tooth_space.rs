@@ -3,10 +3,11 @@
 
 use nalgebra::{Point2, Unit, Vector2};
 
+use crate::cam::CurvePoint;
 use crate::drive::{Drive, DriveError};
 use crate::gaps::{MM_PER_UM, Modification, RAD_PER_ARCSEC, TipRelief};
 use crate::position::{Position, half_lobe_rad};
-use crate::profile::{CurvePoint, Density, SampledCurve, flank_curve, sampled};
+use crate::profile::{Density, SampledCurve, flank_curve, sampled};
 use crate::ring::{FlankEnd, RingFlank, RingTooth};
 use crate::root::{NotConverged, bracketed};
 use crate::violation::{Modified, Violation};
@@ -327,14 +328,14 @@ impl ShapedFlank {
         let place = |x: f64| {
             if x < 0.5 * half_rad { Position::from_valley(x, lobes) } else { Position::from_lobe(half_rad - x, lobes) }
         };
-        let places = |from: u32| (from..=PLACES).map(move |i| half_rad * (f64::from(PLACES - i) / f64::from(PLACES)));
+        let places = || (1..=PLACES).map(move |i| half_rad * (f64::from(PLACES - i) / f64::from(PLACES)));
         let relieved = |position: Position| {
             self.at(position, self.relief.is_some_and(|relief| position.from_lobe_rad > relief.start_rad))
         };
         // Flanks that are rotated towards each other start at their crossing in the middle of the space.
         let mut start = Position::lobe(lobes);
         if self.turned_rad < 0.0 {
-            let Some(beyond) = first(places(1), |x| Ok(relieved(place(x))?.angle_rad > 0.0))? else { return Ok(None) };
+            let Some(beyond) = first(places(), |x| Ok(relieved(place(x))?.angle_rad > 0.0))? else { return Ok(None) };
             let angle = |psi: f64| Ok(relieved(Position::from_lobe(psi, lobes))?.angle_rad);
             let psi = bracketed("start of a turned flank", 0.0, self.turned_rad, half_rad - beyond, angle)?;
             start = Position::from_lobe(psi, lobes);
@@ -371,7 +372,7 @@ impl ShapedFlank {
             }
         }
         let mut before = start.from_valley_rad;
-        for x in places(1).filter(|&x| x < start.from_valley_rad) {
+        for x in places().filter(|&x| x < start.from_valley_rad) {
             if !is_flank(&relieved(place(x))?) {
                 return Ok(None);
             }

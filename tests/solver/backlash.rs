@@ -27,9 +27,8 @@ fn with_gap(p: &DriveParameters, clearance_um: PerContact<f64>) -> Backlash {
     of(p, &with_clearance(clearance_um), &Deviations::default()).unwrap()
 }
 
-fn at_rad(p: &DriveParameters, load: &LoadParameters, deviations: &Deviations, input_angle_deg: f64) -> f64 {
-    let parts = backlash::at(&drive(p), &LoadCase::new(load).unwrap(), deviations, input_angle_deg).unwrap();
-    parts.iter().map(|(_, part)| part).sum()
+fn arcmin_at(p: &DriveParameters, load: &LoadParameters, deviations: &Deviations, input_angle_deg: f64) -> f64 {
+    backlash::arcmin_at(&drive(p), &LoadCase::new(load).unwrap(), deviations, input_angle_deg).unwrap()
 }
 
 fn arcmin(rad: f64) -> f64 {
@@ -43,26 +42,26 @@ fn only(contact: Contact, value: f64) -> PerContact<f64> {
 #[test]
 fn case_5_1_has_its_mean_and_contributions() {
     let found = with_gap(&PAPER_5_1, everywhere(10.0));
-    let parts = found.contribution_rad;
-    for (value_rad, expected) in
-        [(found.mean_rad, 6.266), (parts.wave_generator, 2.476), (parts.ring, 2.681), (parts.carrier, 1.108)]
+    let parts = found.contribution_arcmin;
+    for (value, expected) in
+        [(found.mean_arcmin, 6.266), (parts.wave_generator, 2.476), (parts.ring, 2.681), (parts.carrier, 1.108)]
     {
-        assert!((arcmin(value_rad) - expected).abs() < 6e-4, "{} is not {expected}", arcmin(value_rad));
+        assert!((value - expected).abs() < 6e-4, "{value} is not {expected}");
     }
-    assert!(found.smallest.backlash_rad < found.mean_rad && found.mean_rad < found.largest.backlash_rad);
+    assert!(found.smallest_arcmin < found.mean_arcmin && found.mean_arcmin < found.largest_arcmin);
 }
 
 #[test]
 fn without_gaps_there_is_none() {
     let found = with_gap(&PAPER_5_2, PerContact::default());
-    assert_eq!([found.mean_rad, found.smallest.backlash_rad, found.largest.backlash_rad], [0.0; 3]);
+    assert_eq!([found.mean_arcmin, found.smallest_arcmin, found.largest_arcmin], [0.0; 3]);
 }
 
 #[test]
 fn gaps_alone_have_less_than_together() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, ECCENTRIC] {
-        let alone = Contact::all().map(|contact| with_gap(&p, only(contact, 10.0)).mean_rad);
-        let together = with_gap(&p, everywhere(10.0)).mean_rad;
+        let alone = Contact::all().map(|contact| with_gap(&p, only(contact, 10.0)).mean_arcmin);
+        let together = with_gap(&p, everywhere(10.0)).mean_arcmin;
         assert!(alone.iter().sum::<f64>() < together, "{alone:?} {together}");
     }
 }
@@ -73,15 +72,15 @@ fn contributions_are_derivatives_of_the_mean() {
     for p in [PAPER_5_1, PAPER_5_2_BORED, ECCENTRIC] {
         let gaps_um = PerContact { wave_generator: 8.0, ring: 12.0, carrier: 5.0 };
         let found = with_gap(&p, gaps_um);
-        let sum: f64 = found.contribution_rad.iter().map(|(_, part)| part).sum();
-        assert!((sum / found.mean_rad - 1.0).abs() < 1e-14);
+        let sum: f64 = found.contribution_arcmin.iter().map(|(_, part)| part).sum();
+        assert!((sum / found.mean_arcmin - 1.0).abs() < 1e-14);
         for contact in Contact::all() {
             let changed = |factor: f64| {
                 let gap = |other: Contact| gaps_um.get(other) * if other == contact { factor } else { 1.0 };
-                with_gap(&p, PerContact::of(gap)).mean_rad
+                with_gap(&p, PerContact::of(gap)).mean_arcmin
             };
             let slope = (changed(1.0 + step) - changed(1.0 - step)) / (2.0 * step);
-            let off = slope / found.contribution_rad.get(contact) - 1.0;
+            let off = slope / found.contribution_arcmin.get(contact) - 1.0;
             assert!(off.abs() < 1e-4, "{off:e} at {contact:?} of {p:?}");
         }
     }
@@ -98,8 +97,8 @@ fn slot_gaps_alone_close_beside_lobes() {
     let beside_lobe = 1e-2 / radius_mm(0.0) + 1e-2 / radius_mm(1.0);
     let between = 2e-2 / radius_mm(0.5);
     let [least, most] = [beside_lobe.min(between), beside_lobe.max(between)];
-    assert!((found.smallest.backlash_rad / least - 1.0).abs() < 1e-9);
-    assert!((found.largest.backlash_rad / most - 1.0).abs() < 1e-9);
+    assert!((found.smallest_arcmin / arcmin(least) - 1.0).abs() < 1e-9);
+    assert!((found.largest_arcmin / arcmin(most) - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -111,22 +110,25 @@ fn dense_angles_show_the_same_mean_and_no_more() {
             let found = of(p, &load, &deviations).unwrap();
             let period_deg = deviations.mesh(&drive(p)).sweep_period_deg();
             let count = 2000;
-            let at = |step: i32| at_rad(p, &load, &deviations, (f64::from(step) + 0.5) / f64::from(count) * period_deg);
+            let at =
+                |step: i32| arcmin_at(p, &load, &deviations, (f64::from(step) + 0.5) / f64::from(count) * period_deg);
             let dense: Vec<_> = (0..count).map(at).collect();
             let least = dense.iter().copied().fold(f64::INFINITY, f64::min);
             let most = dense.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let mean = dense.iter().sum::<f64>() / f64::from(count);
-            let (smallest, largest) = (found.smallest.backlash_rad, found.largest.backlash_rad);
+            let (smallest, largest) = (found.smallest_arcmin, found.largest_arcmin);
             let range = largest - smallest;
             assert!(smallest <= least + 1e-9 * mean && least - smallest < 0.1 * range, "{smallest} {least} {p:?}");
             assert!(largest >= most - 1e-9 * mean && largest - most < 0.1 * range, "{largest} {most} {p:?}");
-            assert!((found.mean_rad / mean - 1.0).abs() < 3e-3, "{} {mean} {kinds:?} {p:?}", found.mean_rad);
-            for extreme in [found.smallest, found.largest] {
+            assert!((found.mean_arcmin / mean - 1.0).abs() < 3e-3, "{} {mean} {kinds:?} {p:?}", found.mean_arcmin);
+            for (arcmin, at_deg) in
+                [(found.smallest_arcmin, found.smallest_at_deg), (found.largest_arcmin, found.largest_at_deg)]
+            {
                 // A tooth may enter there.
-                let around = [-1e-7, 0.0, 1e-7].map(|off| extreme.input_angle_deg + off);
-                let values = around.map(|angle_deg| at_rad(p, &load, &deviations, angle_deg.max(0.0)));
-                let is_there = |value: f64| (value / extreme.backlash_rad - 1.0).abs() < 1e-6;
-                assert!(values.into_iter().any(is_there), "{extreme:?} {values:?} {p:?}");
+                let around = [-1e-7, 0.0, 1e-7].map(|off| at_deg + off);
+                let values = around.map(|angle_deg| arcmin_at(p, &load, &deviations, angle_deg.max(0.0)));
+                let is_there = |value: f64| (value / arcmin - 1.0).abs() < 1e-6;
+                assert!(values.into_iter().any(is_there), "{arcmin} at {at_deg} {values:?} {p:?}");
             }
         }
     }
@@ -138,12 +140,12 @@ fn a_turned_carrier_moves_the_zero_alone() {
     let modification = Modification { carrier_rotation_arcsec: 20.0, ..Modification::NONE };
     let turned = of(&PAPER_5_1, &LoadParameters { modification, ..gaps }, &Deviations::default()).unwrap();
     let plain = with_gap(&PAPER_5_1, everywhere(10.0));
-    assert!((turned.mean_rad / plain.mean_rad - 1.0).abs() < 1e-9);
-    assert!((turned.smallest.backlash_rad / plain.smallest.backlash_rad - 1.0).abs() < 1e-9);
+    assert!((turned.mean_arcmin / plain.mean_arcmin - 1.0).abs() < 1e-9);
+    assert!((turned.smallest_arcmin / plain.smallest_arcmin - 1.0).abs() < 1e-9);
     let gapless = LoadParameters { modification, ..with_clearance(PerContact::default()) };
     let found = of(&PAPER_5_1, &gapless, &Deviations::default()).unwrap();
-    for backlash_rad in [found.mean_rad, found.smallest.backlash_rad, found.largest.backlash_rad] {
-        assert!(backlash_rad.abs() < 1e-12 * ARCSEC * 20.0, "{backlash_rad:e}");
+    for found_arcmin in [found.mean_arcmin, found.smallest_arcmin, found.largest_arcmin] {
+        assert!(found_arcmin.abs() < 1e-12 * 20.0 / 60.0, "{found_arcmin:e}");
     }
 }
 
@@ -153,7 +155,7 @@ fn a_turned_slot_without_gaps_interferes() {
     slot_angle_arcsec[3] = 30.0;
     let deviations = Deviations { slot_angle_arcsec, ..Deviations::default() };
     let found = of(&PAPER_5_1, &with_clearance(PerContact::default()), &deviations).unwrap();
-    assert!((found.smallest.backlash_rad / (-30.0 * ARCSEC) - 1.0).abs() < 1e-9);
+    assert!((found.smallest_arcmin / -0.5 - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -517,9 +519,9 @@ fn rigid_bodies_turned_until_they_touch_agree() {
             let mut squares = 0.0;
             let mut mean = 0.0;
             for &input_rad in &angles {
-                let found_rad = at_rad(&p, &load, &deviations, input_rad.to_degrees());
-                squares += (found_rad - bodies.backlash_rad(input_rad)).powi(2);
-                mean += found_rad / angles.len() as f64;
+                let found = arcmin_at(&p, &load, &deviations, input_rad.to_degrees());
+                squares += (found - arcmin(bodies.backlash_rad(input_rad))).powi(2);
+                mean += found / angles.len() as f64;
             }
             (squares / angles.len() as f64).sqrt() / mean
         };

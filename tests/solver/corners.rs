@@ -764,7 +764,7 @@ fn corner_slip_follows_motion_of_contact_points() {
             carrier_coefficient: 0.01,
         })
         .unwrap();
-        let losses = Losses::of(&drive, &pressed, &sweep, &friction, &Never).unwrap();
+        let losses = Losses::of(&drive, &pressed, &sweep, &friction, None, &Never).unwrap();
         let (states, end_deg) = (&sweep.states, drive.flank_limit().position.from_lobe_deg());
         let (s, k) = (drive.sense(), drive.flank().teeth_per_wave());
         for at in (0..states.len()).filter(|&at| states.position_deg[at] > end_deg && states.position_deg[at] < 85.0) {

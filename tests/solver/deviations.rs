@@ -450,7 +450,8 @@ fn equal_deviation_of_all_items_is_modification() {
             carrier_coefficient: 0.04,
         });
         let load = LoadCase::new(&torque).unwrap();
-        let lost = |sweep| Losses::of(&drive, &load, sweep, friction.as_ref().unwrap(), &Never).unwrap().mean.total();
+        let lost =
+            |sweep| Losses::of(&drive, &load, sweep, friction.as_ref().unwrap(), None, &Never).unwrap().mean.total();
         assert!((lost(&told_apart) / lost(&alike) - 1.0).abs() < 1e-11);
     }
 }

@@ -319,11 +319,11 @@ fn model_errors_are_generated_from_the_results() {
     let table = format!(
         "//! Errors of the model against elastic bodies, in per cent. Generated from `tests/finite_elements`: run\n\
          //! `WRITE_MODEL_ERRORS=1 cargo test -p toothwave-solver --test solver -- model_errors_are_generated`.\n\n\
-         use super::{{Row, row}};\n\
+         use super::{{Measured, row}};\n\
          use crate::contact_law::LawName::{{Johnson, Linear, Palmgren}};\n\
          use crate::load_sharing::Compatibility::{{Projection, VirtualWork}};\n\n\
          /// Model, its refinements, pointed tips and gaps; errors of force, stress and wind-up.\n\
-         pub(super) const MEASURED: [Row; {}] = [\n{}];\n",
+         pub(super) const MEASURED: [Measured; {}] = [\n{}];\n",
         rows.len(),
         rows.concat()
     );

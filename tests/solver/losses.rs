@@ -6,12 +6,12 @@ use std::sync::atomic::AtomicBool;
 use proptest::prelude::*;
 use serde_json::Value;
 use toothwave_solver::load_sharing::LoadedDrive;
-use toothwave_solver::losses::bearing::{BearingRating, LoadForRevolutions, RollingElement};
+use toothwave_solver::losses::bearing::{BearingRating, RollingElement};
 use toothwave_solver::losses::duty::{Cost, Costs, LossParameters, LossTotals};
-use toothwave_solver::losses::period::{BearingLoad, LossByPlace, Losses, RadialForces, Wear, WearForTime};
+use toothwave_solver::losses::period::{BearingLoad, LossByPlace, Losses, RadialForces, Wear};
 use toothwave_solver::losses::wear::WearParameters;
 use toothwave_solver::losses::{
-    AtInputAngle, Efficiency, Fixed, Friction, FrictionParameters, LoadedTooth, Mechanism, RaceBearing, Turning,
+    Efficiency, Fixed, Friction, FrictionParameters, LoadedTooth, Mechanism, RaceBearing, Turning,
     WaveGeneratorFriction, mean_over_period,
 };
 use toothwave_solver::mesh::{Mesh, Samples};
@@ -146,7 +146,7 @@ fn losses_match_exact_equilibrium_with_vanishing_friction() {
                 }
             }
             let zones = mechanism.zones_in_torque();
-            let lost = turning.lost_nmm_per_rad();
+            let lost = lost_nmm_per_rad(&turning);
             for contact in Contact::all() {
                 let expected = zones * number(&limit["work_nmm_per_rad"][code(contact)]).unwrap();
                 let what = format!("{name}: work at {contact:?}");
@@ -197,7 +197,7 @@ fn loss_error_is_quadratic_in_coefficients() {
                 .iter()
                 .map(|exact| {
                     let (mechanism, friction) = case.friction(entry, exact["factor"].as_f64().unwrap());
-                    let loss_ratio = mechanism.turning(&friction, &teeth).loss_ratio();
+                    let loss_ratio = loss_ratio(&mechanism, &friction, &teeth);
                     efficiencies(&mechanism, loss_ratio).map(|(name, fixed, _)| {
                         let exact = loss_share_of(name, exact[name].as_f64().unwrap());
                         exact / mechanism.loss_share(fixed, loss_ratio) - 1.0
@@ -230,7 +230,7 @@ fn efficiency_error_is_within_reported_bound() {
         for entry in case.frictions() {
             for exact in entry["exact"].as_array().unwrap() {
                 let (mechanism, friction) = case.friction(entry, exact["factor"].as_f64().unwrap());
-                let loss_ratio = mechanism.turning(&friction, &teeth).loss_ratio();
+                let loss_ratio = loss_ratio(&mechanism, &friction, &teeth);
                 for (name, fixed, efficiency) in efficiencies(&mechanism, loss_ratio) {
                     let told = friction.first_order_error(&mechanism, mechanism.loss_share(fixed, loss_ratio));
                     if !told.is_within_measured_range {
@@ -338,6 +338,25 @@ fn bearing_of_5_1(coefficient: f64) -> RaceBearing {
     RaceBearing { coefficient, radius_mm: 52.0 }
 }
 
+/// Returns the total loss.
+fn lost_nmm_per_rad(turning: &Turning) -> f64 {
+    turning.work_nmm_per_rad.iter().map(|(_, &work)| work).sum::<f64>() + turning.bearing_work_nmm_per_rad
+}
+
+/// Returns `M0` of these teeth: the sum of `F_H d sin γ`.
+fn input_torque_nmm(mechanism: &Mechanism, teeth: &[LoadedTooth]) -> f64 {
+    let of_tooth = |tooth: &LoadedTooth| {
+        let lever_arm_mm = tooth.center_radius_mm * tooth.tan_pressure_angle / tooth.tan_pressure_angle.hypot(1.0);
+        tooth.force_n.wave_generator * lever_arm_mm
+    };
+    mechanism.zones_in_torque() * teeth.iter().map(of_tooth).sum::<f64>()
+}
+
+/// Returns `ν = P/(M0 ω_HS)`.
+fn loss_ratio(mechanism: &Mechanism, friction: &Friction, teeth: &[LoadedTooth]) -> f64 {
+    lost_nmm_per_rad(&mechanism.turning(friction, teeth)) / input_torque_nmm(mechanism, teeth)
+}
+
 /// Returns the mean of ν over 40 intervals of a period, by `virtual_work` at 20 N·m.
 fn mean_loss_ratio(parameters: &DriveParameters, mechanism: &Mechanism, friction: &Friction) -> f64 {
     let drive = drive(parameters);
@@ -346,9 +365,8 @@ fn mean_loss_ratio(parameters: &DriveParameters, mechanism: &Mechanism, friction
     let column: Vec<_> = (0..=40_u32)
         .map(|sample| {
             let teeth = teeth_at(&loaded, sample.into(), 40);
-            let turning = mechanism.turning(friction, &teeth);
-            assert_near(turning.input_torque_nmm, 20e3, 1e-8, "torque of the listed teeth");
-            AtInputAngle { input_angle: f64::from(sample), value: turning.loss_ratio() }
+            assert_near(input_torque_nmm(mechanism, &teeth), 20e3, 1e-8, "torque of the listed teeth");
+            (f64::from(sample), loss_ratio(mechanism, friction, &teeth))
         })
         .collect();
     mean_over_period(&column)
@@ -378,9 +396,10 @@ fn input_power_equals_output_power_plus_losses() {
         let drive = drive(&PAPER_5_2);
         let load = LoadCase::new(&load(3.0, Compatibility::VirtualWork)).unwrap();
         let loaded = LoadedDrive::new(&drive, &load).unwrap();
-        let turning = mechanism.turning(&friction, &teeth_at(&loaded, 3, 20));
+        let teeth = teeth_at(&loaded, 3, 20);
+        let turning = mechanism.turning(&friction, &teeth);
         let turning_rad_per_s = mechanism.turning_rad_per_s(1500.0);
-        let lost_w = 1e-3 * turning.lost_nmm_per_rad() * turning_rad_per_s;
+        let lost_w = 1e-3 * lost_nmm_per_rad(&turning) * turning_rad_per_s;
         // Speeds of wave generator, ring and carrier against the member that stands still, at this speed of the first against the last.
         let k = mechanism.ring_teeth_per_wave();
         let (cam, ring) = (turning_rad_per_s, -mechanism.sense() / k * turning_rad_per_s);
@@ -395,7 +414,8 @@ fn input_power_equals_output_power_plus_losses() {
             let powers_w = [torque_nm[0] * (cam - still), torque_nm[1] * (ring - still), torque_nm[2] * -still];
             assert!(powers_w.iter().sum::<f64>().abs() < 1e-10);
             let out_w = powers_w.iter().copied().fold(0.0, f64::max);
-            let Efficiency { driven, back_driven } = mechanism.efficiency(fixed, turning.loss_ratio());
+            let Efficiency { driven, back_driven } =
+                mechanism.efficiency(fixed, loss_ratio(&mechanism, &friction, &teeth));
             assert_near(out_w / driven, out_w + lost_w, 1e-12 * out_w, "driven");
             assert_near(out_w * back_driven, out_w - lost_w, 1e-12 * out_w, "driven from behind");
         }
@@ -455,7 +475,7 @@ proptest! {
         };
         let teeth = teeth_at(&loaded, sample, 7);
         let turning = mechanism.turning(&Friction::new(&friction).unwrap(), &teeth);
-        let lost = turning.lost_nmm_per_rad();
+        let lost = lost_nmm_per_rad(&turning);
         let here = lost_at(&mechanism, &friction, &teeth, turning.race_mm_per_rad);
         prop_assert!((lost - here).abs() <= 1e-12 * here.max(1e-3), "{lost} {here}");
         for race in [0.0, other * race_radius_mm, turning.race_mm_per_rad + 1e-3 * other * race_radius_mm] {
@@ -475,14 +495,14 @@ proptest! {
         let flat = Mechanism { tooth_spins: false, ..spinning };
         let teeth = teeth_at(&loaded, sample, 7);
         let friction = plain(on_cam, elsewhere);
-        let lost = |mechanism: &Mechanism, friction: &Friction| mechanism.turning(friction, &teeth).lost_nmm_per_rad();
+        let lost = |mechanism: &Mechanism, friction: &Friction| lost_nmm_per_rad(&mechanism.turning(friction, &teeth));
         prop_assert!(lost(&spinning, &friction) <= lost(&flat, &friction) * (1.0 + 1e-14));
         let bearing = |coefficient| RaceBearing { coefficient, radius_mm: spinning.race_radius_mm };
         let race = |on_balls| WaveGeneratorFriction::Race { coefficient: on_cam, bearing: bearing(on_balls) };
         // A bearing rougher than the teeth never turns.
         let stuck = spinning.turning(&with(race(2.0 * on_cam), elsewhere), &teeth);
         prop_assert_eq!(stuck.race_mm_per_rad, 0.0);
-        prop_assert_eq!(stuck.lost_nmm_per_rad(), lost(&spinning, &friction));
+        prop_assert_eq!(lost_nmm_per_rad(&stuck), lost(&spinning, &friction));
         // A free race loses less than the cam, and at least as much as a race without rubbing.
         let free = lost(&spinning, &with(race(0.0), elsewhere));
         let rolling = lost(&spinning, &with(WaveGeneratorFriction::Rolling { bearing: bearing(0.0) }, elsewhere));
@@ -499,13 +519,13 @@ fn unloaded_tooth_loses_nothing() {
     let mechanism = mechanism(&PAPER_5_1);
     let mut teeth = teeth_at(&loaded, 0, 50);
     let friction = plain(0.03, 0.05);
-    let all = mechanism.turning(&friction, &teeth);
+    let (all, ratio) = (mechanism.turning(&friction, &teeth), loss_ratio(&mechanism, &friction, &teeth));
     let idle = LoadedTooth { force_n: PerContact::default(), ..teeth[3] };
     teeth.push(idle);
     let more = mechanism.turning(&friction, &teeth);
     assert_eq!(more.teeth.last().unwrap().rolls, None);
-    assert_eq!(more.lost_nmm_per_rad(), all.lost_nmm_per_rad());
-    assert_eq!(more.loss_ratio(), all.loss_ratio());
+    assert_eq!(lost_nmm_per_rad(&more), lost_nmm_per_rad(&all));
+    assert_eq!(loss_ratio(&mechanism, &friction, &teeth), ratio);
 }
 
 /// Teeth that cannot spin slip at all parts.
@@ -632,7 +652,7 @@ fn bearing_life_follows_iso_281() {
     assert_near(roller, 1e6 * 10.0_f64.powf(10.0 / 3.0) / 60e3, 1e-7, "roller");
     assert_eq!(RollingElement::Ball.life_h(10_000.0, 0.0, 1_000.0), f64::INFINITY);
     // Half of the turns are unloaded, so P falls by the cube root of two.
-    let loads = [(2_000.0, 1.0), (0.0, 1.0)].map(|(load_n, revolutions)| LoadForRevolutions { load_n, revolutions });
+    let loads = [(2_000.0, 1.0), (0.0, 1.0)];
     assert_near(RollingElement::Ball.mean_load_n(&loads), 2_000.0 / 2.0_f64.cbrt(), 1e-9, "mean load");
     assert_eq!(RollingElement::Ball.mean_load_n(&loads[1..]), 0.0);
 }
@@ -696,11 +716,8 @@ fn duty_adds_energies() {
 
 #[test]
 fn period_mean_halves_ends_and_splits_jumps() {
-    let column = |points: &[(f64, f64)]| -> Vec<AtInputAngle> {
-        points.iter().map(|&(input_angle, value)| AtInputAngle { input_angle, value }).collect()
-    };
-    assert_eq!(mean_over_period(&column(&[(0.0, 1.0), (1.0, 3.0), (2.0, 1.0)])), 2.0);
-    assert_eq!(mean_over_period(&column(&[(0.0, 1.0), (1.0, 1.0), (1.0, 5.0), (4.0, 5.0)])), 4.0);
+    assert_eq!(mean_over_period(&[(0.0, 1.0), (1.0, 3.0), (2.0, 1.0)]), 2.0);
+    assert_eq!(mean_over_period(&[(0.0, 1.0), (1.0, 1.0), (1.0, 5.0), (4.0, 5.0)]), 4.0);
 }
 
 #[test]
@@ -745,7 +762,7 @@ fn period_loss_is_mean_over_input_angles() {
         let sweep = sweep(&drive, &load, Points::samples(40).unwrap(), &Never).unwrap();
         let race = WaveGeneratorFriction::Race { coefficient: 0.05, bearing: bearing_of_5_1(0.002) };
         for friction in [plain(0.03, 0.05), with(race, 0.04)] {
-            let losses = Losses::of(&drive, &load, &sweep, &friction, &Never).unwrap();
+            let losses = Losses::of(&drive, &load, &sweep, &friction, None, &Never).unwrap();
             let expected = mean_loss_ratio(&parameters, &mechanism, &friction);
             assert_near(losses.mean.total(), expected, 1e-12 * expected, "mean");
             let loaded = LoadedDrive::new(&drive, &load).unwrap();
@@ -775,7 +792,7 @@ fn losses_equal_force_times_slip_with_moving_generator() {
     })
     .unwrap();
     let sweep = sweep(&drive, &load, Points::samples(7).unwrap(), &Never).unwrap();
-    let losses = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), &Never).unwrap();
+    let losses = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), None, &Never).unwrap();
     let coefficient = PerContact { wave_generator: 0.03, ring: 0.05, carrier: 0.05 };
     let states = &sweep.states;
     for (&angle_deg, &loss_ratio) in sweep.input_angles.input_angle_deg.iter().zip(&losses.loss_ratio) {
@@ -796,7 +813,7 @@ fn pressure_times_velocity_peak_is_largest_product() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let sweep = sweep(&drive, &load, Points::samples(40).unwrap(), &Never).unwrap();
-    let losses = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), &Never).unwrap();
+    let losses = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), None, &Never).unwrap();
     let peaks = losses.pressure_velocity_peaks(&sweep, 50.0);
     for contact in Contact::all() {
         let products = sweep.states.stress_mpa.get(contact).iter().zip(losses.slip_mm_per_rad.get(contact));
@@ -817,7 +834,7 @@ fn tolerance_sweep_loses_as_many_samples() {
         let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
         let mean = |points| {
             let sweep = sweep(&drive, &load, points, &Never).unwrap();
-            let losses = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), &Never).unwrap();
+            let losses = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), None, &Never).unwrap();
             // At a tooth's entry the angle appears twice and counts twice here too.
             assert_eq!(losses.loss_ratio.len(), sweep.input_angles.input_angle_deg.len());
             losses.mean.total()
@@ -860,7 +877,7 @@ fn sweep_radial_force_follows_torque_on_eccentric_only() {
         let sweep = sweep(&drive, &load, Points::samples(9).unwrap(), &Never).unwrap();
         RadialForces::of(&drive, &load, &Deviations::default(), &sweep, &Never).unwrap()
     };
-    let assert_across = |RadialForces { force_n, direction_deg }: RadialForces, tolerance_n: f64| {
+    let assert_across = |RadialForces { force_n, direction_deg, .. }: RadialForces, tolerance_n: f64| {
         assert_eq!(force_n.len(), 10);
         for (force_n, direction_deg) in force_n.iter().zip(direction_deg) {
             assert_near(force_n * direction_deg.to_radians().sin(), -5e3 / 1.2, tolerance_n, "across the eccentricity");
@@ -882,7 +899,7 @@ fn losses_stop_on_request() {
     let drive = drive(&PAPER_5_1);
     let load = LoadCase::new(&load(20.0, Compatibility::VirtualWork)).unwrap();
     let sweep = sweep(&drive, &load, Points::samples(4).unwrap(), &Never).unwrap();
-    let stopped = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), &AtomicBool::new(true));
+    let stopped = Losses::of(&drive, &load, &sweep, &plain(0.03, 0.05), None, &AtomicBool::new(true));
     assert_eq!(stopped, Err(SolveError::Stopped));
 }
 
@@ -903,8 +920,8 @@ fn sweep_wear_is_that_of_its_states() {
     let parameters = wear_parameters(&mechanism);
     let race = WaveGeneratorFriction::Race { coefficient: 0.05, bearing: bearing_of_5_1(0.002) };
     for friction in [plain(0.03, 0.05), with(race, 0.04)] {
-        let losses = Losses::of(&drive, &load, &sweep, &friction, &Never).unwrap();
-        let wear = Wear::of(&drive, &load, &sweep, &losses, &friction, &parameters, &Never).unwrap();
+        let losses = Losses::of(&drive, &load, &sweep, &friction, Some(&parameters), &Never).unwrap();
+        let wear = losses.wear.unwrap();
         let mut expected = PerContact::of(|_| Vec::new());
         let mut on_race = Vec::new();
         for sample in 0..=40_u32 {
@@ -919,7 +936,7 @@ fn sweep_wear_is_that_of_its_states() {
                     expected.get_mut(contact).push(*depth.get(contact));
                 }
             }
-            on_race.push(AtInputAngle { input_angle: sample.into(), value: sum });
+            on_race.push((sample.into(), sum));
         }
         match wear.race_mm_per_hour {
             Some(depth) => {
@@ -954,9 +971,7 @@ fn duty_wear_peaks_after_averaging_each_place() {
         race_mm_per_hour: Some(race),
     };
     let wears = [wear([4.0, 0.0], 1.0), wear([0.0, 8.0], 5.0)];
-    let points = [3.0, 1.0].iter().zip(&wears).map(|(&share_of_time, wear)| WearForTime { share_of_time, wear });
-    let points: Vec<_> = points.collect();
-    assert_eq!(Wear::over_duty(&points), wear([3.0, 2.0], 2.0));
+    assert_eq!(Wear::over_duty(&[(3.0, &wears[0]), (1.0, &wears[1])]), wear([3.0, 2.0], 2.0));
 }
 
 #[test]
@@ -971,8 +986,8 @@ fn ball_wears_groove_by_pressure_over_its_middle() {
     let sweep = sweep(&drive, &load, Points::samples(6).unwrap(), &Never).unwrap();
     // On a rough cam teeth roll there and slip at ring and slot.
     let (friction, parameters) = (plain(0.2, 0.05), wear_parameters(&mechanism));
-    let losses = Losses::of(&drive, &load, &sweep, &friction, &Never).unwrap();
-    let wear = Wear::of(&drive, &load, &sweep, &losses, &friction, &parameters, &Never).unwrap();
+    let losses = Losses::of(&drive, &load, &sweep, &friction, Some(&parameters), &Never).unwrap();
+    let wear = losses.wear.unwrap();
     let mut state = 0;
     for sample in 0..=6 {
         let teeth = teeth_at(&loaded, sample, 6);
@@ -1020,19 +1035,15 @@ fn eccentric_bearing_carries_radial_force_at_race_speed() {
     let forces = RadialForces::of(&drive, &load, &Deviations::default(), &sweep, &Never).unwrap().unwrap();
     let bearing = RaceBearing { coefficient: 0.002, radius_mm: 25.0 };
     let of = |wave_generator, element| {
-        let losses = Losses::of(&drive, &load, &sweep, &with(wave_generator, 0.05), &Never).unwrap();
+        let losses = Losses::of(&drive, &load, &sweep, &with(wave_generator, 0.05), None, &Never).unwrap();
         BearingLoad::of(&mechanism, element, &sweep, &losses, &forces)
     };
     for (element, exponent) in [(RollingElement::Ball, 3.0), (RollingElement::Roller, 10.0 / 3.0)] {
         // A race at rest against the carrier turns like the wave generator at every angle.
         let still = of(WaveGeneratorFriction::Rolling { bearing }, element).unwrap();
         assert_near(still.speed_ratio, 1.0, 1e-14, "speed");
-        let powers: Vec<_> = forces
-            .force_n
-            .iter()
-            .enumerate()
-            .map(|(at, force_n)| AtInputAngle { input_angle: at as f64, value: force_n.powf(exponent) })
-            .collect();
+        let powers: Vec<_> =
+            forces.force_n.iter().enumerate().map(|(at, force_n)| (at as f64, force_n.powf(exponent))).collect();
         let mean_n = mean_over_period(&powers).powf(1.0 / exponent);
         assert_near(still.mean_load_n, mean_n, 1e-12 * mean_n, "mean load");
         assert!(still.mean_load_n >= 5e3 / 1.2);
@@ -1082,13 +1093,12 @@ fn bearing_mean_load_uses_trapezoids_up_to_jumps() {
     let sweep = sweep(&drive, &load, Points::tolerance(1e-2, 100_000).unwrap(), &Never).unwrap();
     let forces = RadialForces::of(&drive, &load, &Deviations::default(), &sweep, &Never).unwrap().unwrap();
     let rolling = WaveGeneratorFriction::Rolling { bearing: RaceBearing { coefficient: 0.002, radius_mm: 25.0 } };
-    let losses = Losses::of(&drive, &load, &sweep, &with(rolling, 0.05), &Never).unwrap();
+    let losses = Losses::of(&drive, &load, &sweep, &with(rolling, 0.05), None, &Never).unwrap();
     let found = BearingLoad::of(&mechanism, RollingElement::Ball, &sweep, &losses, &forces).unwrap();
     let angles = &sweep.input_angles.input_angle_deg;
     assert!(angles.windows(2).any(|pair| pair[0] == pair[1]), "a jump stands twice");
     let cubes = angles.iter().zip(&forces.force_n);
-    let cubes: Vec<_> =
-        cubes.map(|(&input_angle, force_n)| AtInputAngle { input_angle, value: force_n.powi(3) }).collect();
+    let cubes: Vec<_> = cubes.map(|(&input_angle_deg, force_n)| (input_angle_deg, force_n.powi(3))).collect();
     let mean_n = mean_over_period(&cubes).cbrt();
     assert_near(found.mean_load_n, mean_n, 1e-12 * mean_n, "mean load");
 }

@@ -2,7 +2,10 @@
 
 use serde::Serialize;
 pub use toothwave_solver::PerContact;
+use toothwave_solver::backing::Estimate;
 use toothwave_solver::backlash::Backlash;
+use toothwave_solver::fingers::FingerStress;
+use toothwave_solver::losses::period::RadialForces;
 pub use toothwave_solver::mesh::TeethInMesh;
 pub use toothwave_solver::model_error::ModelError;
 pub use toothwave_solver::sweep::TorqueCapacity;
@@ -12,11 +15,9 @@ use utoipa::ToSchema;
 
 use crate::design::ModelDocument;
 use crate::findings::FindingAnswer;
-use crate::sweep::backing::EstimateAnswer;
-use crate::sweep::backlash::BacklashAnswer;
+use crate::sweep::backlash::unless_interfering;
 use crate::sweep::duty::DutyAnswer;
-use crate::sweep::fingers::FingersAnswer;
-use crate::sweep::losses::{LossesAnswer, RadialForceAnswer};
+use crate::sweep::losses::LossesAnswer;
 
 /// Forces and contact stresses over one period: of one meshing zone if the zones are alike, otherwise of all zones.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -55,7 +56,7 @@ pub struct SweepAnswer {
     pub torque_capacity: Option<TorqueCapacity>,
     /// Strength of the carrier's fingers. Left out for balls, and for a carrier that cannot be made.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub fingers: Option<FingersAnswer>,
+    pub fingers: Option<FingerStress>,
     /// Points of the duty, with `load.duty`. The other fields belong to the point with the largest torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub duty: Option<DutyAnswer>,
@@ -65,7 +66,7 @@ pub struct SweepAnswer {
     /// Radial force of the teeth on the wave generator, in N. Left out if two or more lobes are loaded alike, because
     /// the forces then balance.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub radial_force_n: Option<RadialForceAnswer>,
+    pub radial_force_n: Option<RadialForces>,
     /// The complete model that was used. As `model` of the document it gives the same answer. Instead of deprecated
     /// switches it has `refinements`.
     pub model: ModelDocument,
@@ -73,7 +74,7 @@ pub struct SweepAnswer {
     pub model_error: ModelError,
     /// Compliances of the supports, estimated from `parts`. Forces include them only with
     /// `model.series_compliance_mm_per_n`. Balls, and parts that cannot be made, have none.
-    pub series_compliance_estimates: Vec<EstimateAnswer>,
+    pub series_compliance_estimates: Vec<Estimate>,
     /// Residuals of conditions that the results must meet.
     pub checks: ChecksAnswer,
     /// Findings for the designer.
@@ -132,7 +133,7 @@ pub struct StatesAnswer {
 pub struct WindUpAnswer {
     /// Backlash at the output, without load. Absent if a tooth has no space on a lobe or in a valley.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub backlash: Option<BacklashAnswer>,
+    pub backlash: Option<Backlash>,
     /// Transmission error, peak to peak: range of the wind-up over the period, at the output, in deg.
     pub transmission_error_peak_to_peak_deg: f64,
     /// Transmission error without load, peak to peak, in deg. Only with gaps.
@@ -165,7 +166,7 @@ impl WindUpAnswer {
         let InputAngles { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth, .. } =
             sweep.input_angles.clone();
         Ok(Self {
-            backlash: BacklashAnswer::of(backlash)?,
+            backlash: unless_interfering(backlash)?,
             transmission_error_peak_to_peak_deg: sweep.transmission_error_peak_to_peak_deg(drive),
             unloaded_transmission_error_peak_to_peak_deg: unloaded_peak_to_peak_deg,
             input_angle_deg,

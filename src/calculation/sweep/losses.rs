@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 use toothwave_solver::losses::bearing::BearingLife;
 pub use toothwave_solver::losses::duty::LossTotals;
-use toothwave_solver::losses::period::{self, LossByPlace, RadialForces};
+use toothwave_solver::losses::period::{self, LossByPlace};
 use toothwave_solver::losses::{Efficiencies, Fixed, Mechanism};
 use toothwave_solver::sweep::{Peak, Sweep};
 use toothwave_solver::{Contact, PerContact};
@@ -54,18 +54,6 @@ pub struct LossesByInputAngleAnswer {
     pub loss_ratio: Vec<f64>,
     /// Efficiencies at each input angle.
     pub efficiency: Efficiencies<Vec<f64>>,
-}
-
-/// Radial force of the teeth on the wave generator, if no two lobes carry the same load: columns of equal length, one
-/// entry per input angle.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct RadialForceAnswer {
-    /// Input angle j.
-    pub input_angle_deg: Vec<f64>,
-    /// Magnitude of the force, in N.
-    pub value: Vec<f64>,
-    /// Direction of the force in the wave generator's frame, from the middle of lobe 0.
-    pub direction_deg: Vec<f64>,
 }
 
 impl LossesAnswer {
@@ -166,13 +154,5 @@ impl From<Option<Contact>> for RollsAnswer {
             Some(Contact::Carrier) => Self::Carrier,
             None => Self::Nowhere,
         }
-    }
-}
-
-impl RadialForceAnswer {
-    pub(super) fn new(sweep: &Sweep, forces: RadialForces) -> Result<Self, NoAnswer> {
-        let RadialForces { force_n, direction_deg } = forces;
-        require_finite([&force_n, &direction_deg])?;
-        Ok(Self { input_angle_deg: sweep.input_angles.input_angle_deg.clone(), value: force_n, direction_deg })
     }
 }

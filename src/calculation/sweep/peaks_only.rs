@@ -1,6 +1,8 @@
 //! A sweep without its columns: the answer of a batch with `peaks_only`.
 
 use serde::{Serialize, Serializer};
+use toothwave_solver::backing::Estimate;
+use toothwave_solver::fingers::FingerStress;
 use toothwave_solver::sweep::ContactPeaks;
 
 use crate::design::ModelDocument;
@@ -9,9 +11,7 @@ use crate::forms::{Form, Format, Forms};
 use crate::sweep::answer::{
     ChecksAnswer, LoadAnswer, ModelError, PerContact, SweepAnswer, TeethInMesh, TorqueCapacity,
 };
-use crate::sweep::backing::EstimateAnswer;
 use crate::sweep::duty::DutyAnswer;
-use crate::sweep::fingers::FingersAnswer;
 use crate::sweep::losses::LossesAnswer;
 
 /// The answer of a sweep without columns.
@@ -33,13 +33,13 @@ struct View {
     peaks: PerContact<ContactPeaks>,
     model: ModelDocument,
     model_error: ModelError,
-    series_compliance_estimates: Vec<EstimateAnswer>,
+    series_compliance_estimates: Vec<Estimate>,
     teeth_in_mesh_per_zone: TeethInMesh,
     loaded_teeth_per_zone: TeethInMesh,
     #[serde(skip_serializing_if = "Option::is_none")]
     torque_capacity: Option<TorqueCapacity>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    fingers: Option<FingersAnswer>,
+    fingers: Option<FingerStress>,
     #[serde(skip_serializing_if = "Option::is_none")]
     duty: Option<DutyAnswer>,
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "totals")]

@@ -7,7 +7,7 @@ use toothwave_solver::sweep::Extremes;
 use crate::findings::write_findings;
 use crate::json::word;
 use crate::sweep::answer::SweepAnswer;
-use crate::sweep::{backing, losses, model_error};
+use crate::sweep::{backing, backlash, fingers, losses, model_error};
 
 impl SweepAnswer {
     pub(super) fn write_text(&self, writer: &mut dyn Write) -> io::Result<()> {
@@ -45,8 +45,8 @@ impl SweepAnswer {
                 capacity.input_torque_nm, capacity.output_torque_nm, capacity.input_angle_deg
             )?;
         }
-        if let Some(fingers) = &self.fingers {
-            fingers.write_text(writer)?;
+        if let Some(stress) = &self.fingers {
+            fingers::write_text(stress, writer)?;
         }
         if let Some(wind_up) = &self.wind_up {
             let Extremes { least, largest } = Extremes::of(&wind_up.wind_up_deg);
@@ -62,15 +62,15 @@ impl SweepAnswer {
             if let Some(error_deg) = wind_up.unloaded_transmission_error_peak_to_peak_deg {
                 writeln!(writer, "the same without load               {error_deg:.3e} deg")?;
             }
-            if let Some(backlash) = &wind_up.backlash {
-                backlash.write_text(writer)?;
+            if let Some(found) = &wind_up.backlash {
+                backlash::write_text(found, writer)?;
             }
         }
         if let Some(losses) = &self.losses {
             losses::write_text(&losses.totals, writer)?;
         }
         if let Some(radial_force) = &self.radial_force_n {
-            let most_n = radial_force.value.iter().copied().fold(0.0, f64::max);
+            let most_n = radial_force.force_n.iter().copied().fold(0.0, f64::max);
             writeln!(writer, "\nlargest force on the wave generator {most_n:.6} N, across its axis")?;
         }
         model_error::write_text(&self.model_error, writer)?;

@@ -3,10 +3,9 @@
 
 use nalgebra::{Point2, Unit, Vector2};
 
-use crate::cam::kind::{CamContact, CamPoint, Given, Hollow, Kind, ToothCenter};
+use crate::cam::kind::{CamContact, CurvePoint, Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_in_bracket};
-use crate::violation::Parameter;
 
 /// An ellipse centred on the axis, `a > b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,19 +24,6 @@ struct Normal {
 impl Ellipse {
     pub(super) const fn new(semi_major_mm: f64, semi_minor_mm: f64) -> Self {
         Self { semi_major_mm, semi_minor_mm }
-    }
-
-    pub(super) const fn given(semi_major_mm: f64, semi_minor_mm: f64) -> Given {
-        let size = (Parameter::SemiMajor, semi_major_mm);
-        Given {
-            lobes: 2,
-            given_lobes: None,
-            size,
-            shape: (Parameter::SemiMinor, semi_minor_mm),
-            stroke: size,
-            mean_radius_mm: 0.5 * (semi_major_mm + semi_minor_mm),
-            is_path: false,
-        }
     }
 
     /// Returns `a`.
@@ -186,7 +172,7 @@ impl Kind for Ellipse {
     }
 
     /// An ellipse is convex.
-    fn hollow(&self) -> Option<Hollow> {
+    fn hollow(&self) -> Option<(f64, f64)> {
         None
     }
 
@@ -211,12 +197,12 @@ impl Kind for Ellipse {
     }
 
     /// Takes the place as the angle φ of the normal, so that no tooth position has to be found.
-    fn outline(&self, _: f64, set_back_mm: f64, place: Position) -> Result<CamPoint, NotConverged> {
+    fn outline(&self, _: f64, set_back_mm: f64, place: Position) -> Result<CurvePoint, NotConverged> {
         let (a, b) = (self.semi_major_mm, self.semi_minor_mm);
         let normal = Normal { cos: place.phase_cos, sin: place.phase_sin };
         let h = self.support_mm(normal);
         let point = Point2::new(a * (a / h) * normal.cos, b * (b / h) * normal.sin);
-        Ok(CamPoint {
+        Ok(CurvePoint {
             point: point - set_back_mm * Vector2::new(normal.cos, normal.sin),
             tangent: Unit::new_unchecked(Vector2::new(-normal.sin, normal.cos)),
             bend: 1.0,

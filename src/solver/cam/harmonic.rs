@@ -1,10 +1,9 @@
 //! Support function `h = R0 + e cos Uφ`. With one lobe it is exactly the circle of radius R0 about a point at the
 //! distance e from the axis (docs/explanation/theory.md section 2.9).
 
-use crate::cam::kind::{CamContact, Given, Hollow, Kind, ToothCenter};
+use crate::cam::kind::{CamContact, Kind, ToothCenter};
 use crate::position::{Position, half_lobe_rad};
 use crate::root::{NotConverged, ValueAndSlope, newton_in_bracket};
-use crate::violation::Parameter;
 
 /// A cam with a harmonic support function.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,26 +23,6 @@ struct NormalPhase {
 impl Harmonic {
     pub(super) const fn new(lobes: u32, mean_radius_mm: f64, amplitude_mm: f64) -> Self {
         Self { lobes, mean_radius_mm, amplitude_mm }
-    }
-
-    pub(super) const fn given(lobes: i64, mean_radius_mm: f64, amplitude_mm: f64) -> Given {
-        let stroke = (Parameter::Amplitude, amplitude_mm);
-        Given {
-            lobes,
-            given_lobes: Some(Parameter::HarmonicLobes),
-            size: (Parameter::MeanRadius, mean_radius_mm),
-            shape: stroke,
-            stroke,
-            mean_radius_mm,
-            is_path: false,
-        }
-    }
-
-    /// Returns the parameters of the eccentric circle.
-    pub(super) const fn eccentric(radius_mm: f64, eccentricity_mm: f64) -> Given {
-        let stroke = (Parameter::Eccentricity, eccentricity_mm);
-        let size = (Parameter::EccentricRadius, radius_mm);
-        Given { given_lobes: None, size, shape: stroke, stroke, ..Self::given(1, radius_mm, eccentricity_mm) }
     }
 
     /// Returns the lower bound of R0: e, so that the axis is inside, and `e(U² - 1)`, so that the lobe is round.
@@ -224,7 +203,7 @@ impl Kind for Harmonic {
     }
 
     /// A cam with a support function is convex.
-    fn hollow(&self) -> Option<Hollow> {
+    fn hollow(&self) -> Option<(f64, f64)> {
         None
     }
 

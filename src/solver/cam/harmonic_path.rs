@@ -3,10 +3,9 @@
 
 use std::f64::consts::PI;
 
-use crate::cam::kind::{CamContact, Given, Hollow, Kind, ToothCenter};
+use crate::cam::kind::{CamContact, Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::{NotConverged, bracketed};
-use crate::violation::Parameter;
 
 /// A cam with a harmonic path of the tooth centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,19 +18,6 @@ pub struct HarmonicPath {
 impl HarmonicPath {
     pub(super) const fn new(lobes: u32, mean_radius_mm: f64, amplitude_mm: f64) -> Self {
         Self { lobes, mean_radius_mm, amplitude_mm }
-    }
-
-    pub(super) const fn given(lobes: i64, mean_radius_mm: f64, amplitude_mm: f64) -> Given {
-        let stroke = (Parameter::Amplitude, amplitude_mm);
-        Given {
-            lobes,
-            given_lobes: Some(Parameter::Lobes),
-            size: (Parameter::MeanPathRadius, mean_radius_mm),
-            shape: stroke,
-            stroke,
-            mean_radius_mm,
-            is_path: true,
-        }
     }
 
     /// Returns the lower bound of R. It exceeds `r + e`, so that the valley is outside the axis. With two lobes or more
@@ -105,12 +91,6 @@ impl HarmonicPath {
     /// Returns `e`.
     pub const fn amplitude_mm(&self) -> f64 {
         self.amplitude_mm
-    }
-
-    /// Returns `R/(U² + 1)`, the amplitude above which the cam is concave in its valleys.
-    fn greatest_convex_amplitude_mm(&self) -> f64 {
-        let u = self.lobe_count();
-        self.mean_radius_mm / (u * u + 1.0)
     }
 
     /// Returns `R`.
@@ -220,9 +200,11 @@ impl Kind for HarmonicPath {
         self.amplitude_mm * ring_teeth * ring_teeth / self.valley_mm()
     }
 
-    fn hollow(&self) -> Option<Hollow> {
-        let limit_mm = self.greatest_convex_amplitude_mm();
-        (self.amplitude_mm > limit_mm).then_some(Hollow { amplitude_mm: self.amplitude_mm, limit_mm })
+    /// With an amplitude above `R/(U² + 1)`.
+    fn hollow(&self) -> Option<(f64, f64)> {
+        let u = self.lobe_count();
+        let limit_mm = self.mean_radius_mm / (u * u + 1.0);
+        (self.amplitude_mm > limit_mm).then_some((self.amplitude_mm, limit_mm))
     }
 
     /// `(R - e)²/(eZ_K² - (R - e))`, with the path unchanged.

@@ -5,23 +5,6 @@ use nalgebra::{Point2, Unit, Vector2};
 
 use crate::position::Position;
 use crate::root::NotConverged;
-use crate::violation::Parameter;
-
-/// Parameters of a wave generator, as each kind defines them in its own file.
-pub(super) struct Given {
-    pub(super) lobes: i64,
-    /// Parameter for the number of lobes; none if the kind fixes it.
-    pub(super) given_lobes: Option<Parameter>,
-    /// Parameter for the size of the cam.
-    pub(super) size: (Parameter, f64),
-    /// Parameter that sets the deviation from a circle.
-    pub(super) shape: (Parameter, f64),
-    /// Parameter that sets the stroke of the teeth.
-    pub(super) stroke: (Parameter, f64),
-    /// Mean radius of the cam, or of the path of the tooth centres.
-    pub(super) mean_radius_mm: f64,
-    pub(super) is_path: bool,
-}
 
 /// Contact of the cam with a tooth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,13 +17,13 @@ pub struct CamContact {
     pub curvature_per_mm: f64,
 }
 
-/// Point of the cam's outline, in its own frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CamPoint {
+/// Point of an outline, with its tangent and sign of curvature.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CurvePoint {
     pub(crate) point: Point2<f64>,
     /// Tangent, counter-clockwise.
     pub(crate) tangent: Unit<Vector2<f64>>,
-    /// Curvature up to a positive factor; negative where the cam is concave.
+    /// Curvature up to a positive factor: its sign changes at an inflection.
     pub(crate) bend: f64,
 }
 
@@ -94,15 +77,6 @@ impl ToothCenter {
     }
 }
 
-/// Concave valleys.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Hollow {
-    /// Amplitude of the cam.
-    pub(crate) amplitude_mm: f64,
-    /// Largest amplitude of a convex cam.
-    pub(crate) limit_mm: f64,
-}
-
 /// Geometry of a kind of wave generator, for teeth of the radius `r`.
 ///
 /// Mesh and load follow from [`Kind::tooth`] only. The other methods are closed forms. They give lengths whose
@@ -143,8 +117,9 @@ pub(crate) trait Kind {
     /// Returns the least tooth radius that undercuts the ring; none if no radius does.
     fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64>;
 
-    /// Returns the concave valleys, if any. There is no default, so that every new kind has to answer.
-    fn hollow(&self) -> Option<Hollow>;
+    /// Returns the amplitude and the largest one of a convex cam, if the valleys are concave. There is no default, so that
+    /// every new kind has to answer.
+    fn hollow(&self) -> Option<(f64, f64)>;
 
     /// Returns a tooth radius below which neighbouring teeth cannot touch, with `sin` of half the angle between them.
     /// No centre is closer to the axis than `d_v`, and `d_v sin > r` is sufficient.
@@ -162,13 +137,13 @@ pub(crate) trait Kind {
 
     /// Returns the point of the outline where the tooth at `place` touches it, offset inward along its normal. A kind
     /// whose outline is known by the normal's angle may take `place` as that angle.
-    fn outline(&self, tooth_radius_mm: f64, set_back_mm: f64, place: Position) -> Result<CamPoint, NotConverged> {
+    fn outline(&self, tooth_radius_mm: f64, set_back_mm: f64, place: Position) -> Result<CurvePoint, NotConverged> {
         let tooth = self.tooth(tooth_radius_mm, place)?;
         let (sin, cos) = tooth.normal_rad().sin_cos();
         let inside_mm = tooth_radius_mm + set_back_mm;
         let (center_sin, center_cos) = place.from_lobe_rad.sin_cos();
         let center = tooth.center_radius_mm * Vector2::new(center_cos, center_sin);
-        Ok(CamPoint {
+        Ok(CurvePoint {
             point: Point2::from(center - inside_mm * Vector2::new(cos, sin)),
             tangent: Unit::new_unchecked(Vector2::new(-sin, cos)),
             // Sign as for the cam itself, as long as its parallel curves are regular.

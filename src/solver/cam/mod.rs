@@ -1,8 +1,7 @@
 //! Wave generators, one file for each kind (docs/explanation/theory.md section 2).
 //!
-//! To add a kind, add a file that implements `Kind` (`kind.rs`) and returns its parameters. Then add a variant of
-//! [`Cam`] with its arm in `Cam::kind`, and a variant of [`WaveGenerator`] with its arms in `WaveGenerator::given` and
-//! `WaveGenerator::cam`.
+//! To add a kind, add a file that implements `Kind` (`kind.rs`). Then add a variant of [`Cam`] with its arm in
+//! `Cam::kind`, and a variant of [`WaveGenerator`] with its arms in the methods below.
 
 mod ellipse;
 mod harmonic;
@@ -14,9 +13,9 @@ use crate::violation::{FieldCode, Parameter, Violation};
 pub use ellipse::Ellipse;
 pub use harmonic::Harmonic;
 pub use harmonic_path::HarmonicPath;
+pub(crate) use kind::CurvePoint;
+use kind::Kind;
 pub use kind::{CamContact, ToothCenter};
-pub(crate) use kind::{CamPoint, Hollow};
-use kind::{Given, Kind};
 
 /// Parameters of a wave generator, not yet checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,57 +77,72 @@ impl Cam {
 }
 
 impl WaveGenerator {
-    const fn given(&self) -> Given {
-        match *self {
-            Self::Ellipse { semi_major_mm, semi_minor_mm } => Ellipse::given(semi_major_mm, semi_minor_mm),
-            Self::Eccentric { radius_mm, eccentricity_mm } => Harmonic::eccentric(radius_mm, eccentricity_mm),
-            Self::Harmonic { lobes, mean_radius_mm, amplitude_mm } => {
-                Harmonic::given(lobes, mean_radius_mm, amplitude_mm)
-            }
-            Self::HarmonicPath { lobes, mean_path_radius_mm, amplitude_mm } => {
-                HarmonicPath::given(lobes, mean_path_radius_mm, amplitude_mm)
-            }
-        }
-    }
-
     /// Returns `U`, as given.
     pub const fn lobes(&self) -> i64 {
-        self.given().lobes
+        match *self {
+            Self::Ellipse { .. } => 2,
+            Self::Eccentric { .. } => 1,
+            Self::Harmonic { lobes, .. } | Self::HarmonicPath { lobes, .. } => lobes,
+        }
     }
 
     /// Returns the given values, each with the parameter that defines its range.
     pub fn parameters(&self) -> Vec<(Parameter, f64)> {
-        let Given { lobes, given_lobes, size, shape, .. } = self.given();
-        given_lobes.map(|parameter| (parameter, lobes as f64)).into_iter().chain([size, shape]).collect()
+        let lobes = match *self {
+            Self::Ellipse { .. } | Self::Eccentric { .. } => None,
+            Self::Harmonic { lobes, .. } => Some((Parameter::HarmonicLobes, lobes as f64)),
+            Self::HarmonicPath { lobes, .. } => Some((Parameter::Lobes, lobes as f64)),
+        };
+        lobes.into_iter().chain(self.size_and_shape()).collect()
     }
 
-    /// Returns the parameters that set the size of the cam and its deviation from a circle.
-    pub const fn size_and_shape(&self) -> [Parameter; 2] {
-        let Given { size, shape, .. } = self.given();
-        [size.0, shape.0]
+    /// Returns the values that set the size of the cam and its deviation from a circle.
+    pub const fn size_and_shape(&self) -> [(Parameter, f64); 2] {
+        match *self {
+            Self::Ellipse { semi_major_mm, semi_minor_mm } => {
+                [(Parameter::SemiMajor, semi_major_mm), (Parameter::SemiMinor, semi_minor_mm)]
+            }
+            Self::Eccentric { radius_mm, eccentricity_mm } => {
+                [(Parameter::EccentricRadius, radius_mm), (Parameter::Eccentricity, eccentricity_mm)]
+            }
+            Self::Harmonic { mean_radius_mm, amplitude_mm, .. } => {
+                [(Parameter::MeanRadius, mean_radius_mm), (Parameter::Amplitude, amplitude_mm)]
+            }
+            Self::HarmonicPath { mean_path_radius_mm, amplitude_mm, .. } => {
+                [(Parameter::MeanPathRadius, mean_path_radius_mm), (Parameter::Amplitude, amplitude_mm)]
+            }
+        }
+    }
+
+    /// Returns the value that sets the stroke of the teeth. For an ellipse it is the semi-major axis, the other being
+    /// fixed.
+    pub(crate) const fn stroke(&self) -> (Parameter, f64) {
+        let [size, shape] = self.size_and_shape();
+        match self {
+            Self::Ellipse { .. } => size,
+            Self::Eccentric { .. } | Self::Harmonic { .. } | Self::HarmonicPath { .. } => shape,
+        }
     }
 
     /// Returns true if the cam depends on the tooth radius, because the path of the teeth is given.
     pub(crate) const fn follows_from_teeth(&self) -> bool {
-        self.given().is_path
+        matches!(self, Self::HarmonicPath { .. })
     }
 
     /// Returns `R_race`: speed of a race along the cam over its angular velocity (docs/explanation/theory.md section
     /// 10.2).
     pub fn race_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
-        let Given { mean_radius_mm, is_path, .. } = self.given();
-        if is_path { mean_radius_mm - tooth_radius_mm } else { mean_radius_mm }
+        match *self {
+            Self::Ellipse { semi_major_mm, semi_minor_mm } => 0.5 * (semi_major_mm + semi_minor_mm),
+            Self::Eccentric { radius_mm, .. } => radius_mm,
+            Self::Harmonic { mean_radius_mm, .. } => mean_radius_mm,
+            Self::HarmonicPath { mean_path_radius_mm, .. } => mean_path_radius_mm - tooth_radius_mm,
+        }
     }
 
     /// True if the cam is an eccentric circle.
     pub const fn is_eccentric_circle(&self) -> bool {
         matches!(self, Self::Eccentric { .. })
-    }
-
-    /// Returns the parameter that sets the stroke of the teeth. For an ellipse it is the semi-major axis, the other
-    /// being fixed.
-    pub(crate) const fn stroke(&self) -> (Parameter, f64) {
-        self.given().stroke
     }
 
     /// Returns the cam for teeth of this radius. Every parameter must be in its range.
@@ -168,7 +182,7 @@ impl WaveGenerator {
         if radius_mm > least_mm {
             Ok(())
         } else {
-            let [parameter, _] = self.size_and_shape();
+            let [(parameter, _), _] = self.size_and_shape();
             let detail = format!(
                 "a wave generator of {radius_mm:?} mm is too small for its stroke, its lobes would have cusps, their flanks would meet, or its axis would lie outside: choose more than {least_mm:?} mm, or a smaller stroke"
             );

@@ -57,30 +57,19 @@ pub fn of_contacts(
             && let Some(groove_radius_mm) = groove_radius_mm(drive, contact)
         {
             let limit_mm = groove_half_width_mm(groove_radius_mm, drive.parameters().tooth_radius_mm);
-            if half_length_mm > limit_mm {
-                findings.push(Finding::warning(Code::ContactBeyondGroove, half_length_mm, limit_mm).at(contact));
-            }
+            let finding = Finding::above(Code::ContactBeyondGroove, half_length_mm, limit_mm);
+            findings.extend(finding.map(|finding| finding.at(contact)));
         }
     }
-    if let Some(allowable_mpa) = &p.allowable_stress_mpa {
-        findings.extend(
-            peaks
-                .iter()
-                .map(|(contact, peaks)| (contact, peaks.stress_mpa.value, *allowable_mpa.get(contact)))
-                // The fatigue limit has its own finding.
-                .filter(|(_, stress_mpa, allowable_mpa)| {
-                    stress_mpa > allowable_mpa && allowable_mpa.total_cmp(&FATIGUE_LIMIT_STRESS_MPA).is_ne()
-                })
-                .map(|(contact, stress_mpa, allowable_mpa)| {
-                    Finding::warning(Code::StressAboveAllowable, stress_mpa, allowable_mpa).at(contact)
-                }),
-        );
-    }
-    let stresses = peaks.iter().map(|(contact, peaks)| (contact, peaks.stress_mpa.value));
-    let tired = stresses.filter(|(_, stress_mpa)| *stress_mpa > FATIGUE_LIMIT_STRESS_MPA);
-    findings.extend(tired.map(|(contact, stress_mpa)| {
-        Finding::warning(Code::StressAboveFatigueLimit, stress_mpa, FATIGUE_LIMIT_STRESS_MPA).at(contact)
-    }));
+    let overstressed = |code: Code, contact: Contact, limit_mpa: f64| {
+        Some(Finding::above(code, peaks.get(contact).stress_mpa.value, limit_mpa)?.at(contact))
+    };
+    // The fatigue limit has its own finding.
+    let allowables = p.allowable_stress_mpa.iter().flat_map(PerContact::iter);
+    let allowables = allowables.filter(|(_, mpa)| mpa.total_cmp(&FATIGUE_LIMIT_STRESS_MPA).is_ne());
+    findings.extend(allowables.filter_map(|(contact, &mpa)| overstressed(Code::StressAboveAllowable, contact, mpa)));
+    let of_fatigue = |contact| overstressed(Code::StressAboveFatigueLimit, contact, FATIGUE_LIMIT_STRESS_MPA);
+    findings.extend(Contact::all().into_iter().filter_map(of_fatigue));
     findings
 }
 
@@ -105,10 +94,9 @@ pub fn of_half_widths(drive: &Drive, load: &LoadCase, states: &States, load_peak
     let length_mm = load.parameters().law.reference_length_mm(drive.parameters().tooth_radius_mm);
     let Some(length_mm) = length_mm else { return Vec::new() };
     widest_half_widths_mm(drive, states, load_peak_over_mean)
-        .map(|(contact, half_width_mm)| {
+        .filter_map(|(contact, half_width_mm)| {
             let limit_mm = WIDE_SHARE * length_mm.get(contact);
-            Finding::warning(Code::JohnsonBeyondHalfWidth, half_width_mm, limit_mm).at(contact)
+            Some(Finding::above(Code::JohnsonBeyondHalfWidth, half_width_mm, limit_mm)?.at(contact))
         })
-        .filter(|finding| finding.value > finding.limit)
         .collect()
 }

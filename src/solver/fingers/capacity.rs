@@ -2,28 +2,10 @@
 
 use crate::SolveError;
 use crate::contact::PerContact;
-use crate::fingers::{CarrierFingers, Strength};
+use crate::fingers::{CarrierFingers, Safety, Strength};
 use crate::load_sharing::LoadCase;
 use crate::root::NotConverged;
-use crate::sweep::{LimitedBy, Sweep, SweepPeaks, TorqueCapacity};
-
-/// Result of a sweep with a torque capacity.
-pub trait Limited {
-    /// Returns the torque capacity, given an allowable stress.
-    fn torque_capacity_mut(&mut self) -> &mut Option<TorqueCapacity>;
-}
-
-impl Limited for Sweep {
-    fn torque_capacity_mut(&mut self) -> &mut Option<TorqueCapacity> {
-        &mut self.torque_capacity
-    }
-}
-
-impl Limited for SweepPeaks {
-    fn torque_capacity_mut(&mut self) -> &mut Option<TorqueCapacity> {
-        &mut self.torque_capacity
-    }
-}
+use crate::sweep::{LimitedBy, TorqueCapacity};
 
 /// Share of the torque to which a capacity that depends on itself is found.
 const PRECISION: f64 = 1e-12;
@@ -39,17 +21,19 @@ const MAX_SWEEPS: u32 = 60;
 const NEARLY_NOTHING: f64 = 1e-9;
 
 impl CarrierFingers {
-    /// Runs a sweep whose torque capacity respects the fingers and the uneven load along them.
+    /// Runs a sweep whose torque capacity respects the fingers and the uneven load along them. `capacity` is the place of
+    /// the capacity in the sweep's result.
     ///
     /// The slot's stress grows with the force on the finger. So the force that a finger bears is an allowable stress of
     /// the slot's contact.
     ///
     /// # Errors
     /// The errors of the sweep.
-    pub fn limited<S: Limited>(
+    pub fn limited<S>(
         &self,
         load: &LoadCase,
         run: impl Fn(&LoadCase) -> Result<S, SolveError>,
+        capacity: fn(&mut S) -> &mut Option<TorqueCapacity>,
     ) -> Result<S, SolveError> {
         let Some(allowable_mpa) = load.parameters().allowable_stress_mpa else { return run(load) };
         let even_mpa = PerContact::of(|contact| allowable_mpa.get(contact) / self.stress_factor(contact));
@@ -58,7 +42,7 @@ impl CarrierFingers {
             let carrier = even_mpa.carrier.min(slot_mpa);
             let mut swept = run(&load.with_allowable_stress(PerContact { carrier, ..even_mpa }))?;
             let mut torque_nm = 0.0;
-            if let Some(capacity) = swept.torque_capacity_mut() {
+            if let Some(capacity) = capacity(&mut swept) {
                 torque_nm = capacity.output_torque_nm;
                 if capacity.limited_by == LimitedBy::Carrier && slot_mpa < even_mpa.carrier {
                     capacity.limited_by = self.finger_limit();
@@ -100,22 +84,21 @@ impl CarrierFingers {
     /// Returns the stress of the slot's contact under the largest force that a finger bears together with the torque.
     fn slot_limit_mpa(&self, output_torque_nm: f64) -> f64 {
         let Some(strength) = self.parameters.strength else { return f64::INFINITY };
-        let (yielding_mpa, fatigue_mpa) = self.nominal_limits_mpa(&strength);
-        let moment_nmm = yielding_mpa.min(fatigue_mpa) / self.nominal_mpa_per_nmm();
+        let moment_nmm = self.safety_at_1_mpa(&strength).least() / self.nominal_mpa_per_nmm();
         let left_nmm = moment_nmm - self.moment_nmm_per_nm * output_torque_nm;
         self.slot.stress_mpa(left_nmm.max(NEARLY_NOTHING * moment_nmm) / self.moment_nmm_per_n)
     }
 
-    /// Returns the nominal stresses at which a finger yields and at which it breaks by fatigue.
-    fn nominal_limits_mpa(&self, strength: &Strength) -> (f64, f64) {
-        let safety = strength.safety(self.parameters.cycle, 1.0, self.concentration());
-        (safety.yielding, safety.fatigue)
+    /// Returns the safety under a nominal stress of 1 MPa: the nominal stresses at which a finger yields and at which it
+    /// breaks by fatigue.
+    fn safety_at_1_mpa(&self, strength: &Strength) -> Safety {
+        strength.safety(self.parameters.cycle, 1.0, self.concentration())
     }
 
     fn finger_limit(&self) -> LimitedBy {
         let is_fatigue = self.parameters.strength.is_some_and(|strength| {
-            let (yielding_mpa, fatigue_mpa) = self.nominal_limits_mpa(&strength);
-            fatigue_mpa < yielding_mpa
+            let Safety { yielding, fatigue } = self.safety_at_1_mpa(&strength);
+            fatigue < yielding
         });
         if is_fatigue { LimitedBy::FingerFatigue } else { LimitedBy::FingerYield }
     }

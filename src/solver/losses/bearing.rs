@@ -57,15 +57,6 @@ impl BearingRating {
     }
 }
 
-/// Load on a bearing during a number of revolutions.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LoadForRevolutions {
-    /// The radial load.
-    pub load_n: f64,
-    /// Number of revolutions, or any quantity proportional to it.
-    pub revolutions: f64,
-}
-
 impl RollingElement {
     /// Returns `p` of the life equation.
     pub const fn life_exponent(self) -> f64 {
@@ -75,15 +66,16 @@ impl RollingElement {
         }
     }
 
-    /// Returns the constant load with the same life as these loads: `(Σ n F^p/Σ n)^(1/p)`.
-    pub fn mean_load_n(self, loads: &[LoadForRevolutions]) -> f64 {
-        let largest_n = loads.iter().map(|load| load.load_n).fold(0.0, f64::max);
+    /// Returns the constant load with the same life as these radial loads: `(Σ n F^p/Σ n)^(1/p)`. With each load is its
+    /// number of revolutions, or any quantity proportional to it.
+    pub fn mean_load_n(self, loads: &[(f64, f64)]) -> f64 {
+        let largest_n = loads.iter().map(|&(load_n, _)| load_n).fold(0.0, f64::max);
         if largest_n <= 0.0 {
             return 0.0;
         }
         // Relative to the largest load, so that no power overflows or underflows.
-        let share = |load: &LoadForRevolutions| load.revolutions * (load.load_n / largest_n).powf(self.life_exponent());
-        let revolutions: f64 = loads.iter().map(|load| load.revolutions).sum();
+        let share = |&(load_n, revolutions): &(f64, f64)| revolutions * (load_n / largest_n).powf(self.life_exponent());
+        let revolutions: f64 = loads.iter().map(|&(_, revolutions)| revolutions).sum();
         largest_n * (loads.iter().map(share).sum::<f64>() / revolutions).powf(1.0 / self.life_exponent())
     }
 

@@ -17,8 +17,8 @@ use crate::drive::Drive;
 use crate::findings::{self, Finding};
 use crate::gaps::Deviations;
 use crate::load_sharing::LoadCase;
-use crate::losses::bearing::{BearingLife, BearingRating, LoadForRevolutions};
-use crate::losses::period::{BearingLoad, LossByPlace, Losses, RadialForces, Wear, WearForTime};
+use crate::losses::bearing::{BearingLife, BearingRating};
+use crate::losses::period::{BearingLoad, LossByPlace, Losses, RadialForces, Wear};
 use crate::losses::wear::{WearParameters, WornPlace};
 use crate::losses::{Efficiencies, FirstOrderError, Fixed, Friction, Mechanism};
 use crate::sweep::{Peak, Points, States, Sweep, sweep_with_deviations};
@@ -191,17 +191,17 @@ impl DutySweep<'_> {
         stop: &dyn Stop,
     ) -> Result<DutyLosses, SolveError> {
         let Self { drive, deviations, duty, .. } = *self;
-        let losses = self.losses_of(parameters, duty.hardest(), hardest, stop)?;
+        let mut losses = self.losses_of(parameters, &duty.points[duty.hardest], hardest, stop)?;
         let cost = |(at, point): (usize, &DutyPoint)| {
             if at == duty.hardest {
-                return self.cost(parameters, point, hardest, forces, &losses, stop);
+                return Ok(self.cost(parameters, point, hardest, forces, &mut losses));
             }
             let sweep = sweep_with_deviations(drive, &point.load, deviations, self.points, stop)?;
             let forces = RadialForces::of(drive, &point.load, deviations, &sweep, stop)?;
-            let losses = self.losses_of(parameters, &point.load, &sweep, stop)?;
-            self.cost(parameters, point, &sweep, forces.as_ref(), &losses, stop)
+            let mut losses = self.losses_of(parameters, point, &sweep, stop)?;
+            Ok(self.cost(parameters, point, &sweep, forces.as_ref(), &mut losses))
         };
-        let points = duty.points.iter().enumerate().map(cost).collect::<Result<_, _>>()?;
+        let points = duty.points.iter().enumerate().map(cost).collect::<Result<_, SolveError>>()?;
         let costs = Costs { mechanism: Mechanism::of(drive), parameters, points };
         Ok(DutyLosses {
             totals: costs.totals(duty.hardest, &hardest.states),
@@ -214,50 +214,47 @@ impl DutySweep<'_> {
     /// Returns the losses of a sweep. The means of a sweep to a tolerance keep it.
     fn losses_of(
         &self,
-        parameters: &LossParameters,
-        load: &LoadCase,
+        LossParameters { friction, wear_rate_mm3_per_nm, .. }: &LossParameters,
+        DutyPoint { load, input_speed_rpm, .. }: &DutyPoint,
         sweep: &Sweep,
         stop: &dyn Stop,
     ) -> Result<Losses, SolveError> {
-        let losses = Losses::of(self.drive, load, sweep, &parameters.friction, stop)?;
+        let wear = wear_rate_mm3_per_nm.zip(*input_speed_rpm).map(|(rate_mm3_per_nm, speed_rpm)| {
+            let turning_rad_per_s = Mechanism::of(self.drive).turning_rad_per_s(speed_rpm);
+            WearParameters { rate_mm3_per_nm, turning_rad_per_s }
+        });
+        let losses = Losses::of(self.drive, load, sweep, friction, wear.as_ref(), stop)?;
         match self.points {
             Points::Samples(_) => Ok(losses),
             Points::Tolerance(tolerance) => {
-                losses.with_mean_to(tolerance.relative(), self.drive, load, self.deviations, &parameters.friction, stop)
+                losses.with_mean_to(tolerance.relative(), self.drive, load, self.deviations, friction, stop)
             }
         }
     }
 
+    /// Returns the losses of a point. Takes the wear out of its losses.
     fn cost(
         &self,
         parameters: &LossParameters,
         DutyPoint { load, input_speed_rpm, share_of_time }: &DutyPoint,
         sweep: &Sweep,
         forces: Option<&RadialForces>,
-        losses: &Losses,
-        stop: &dyn Stop,
-    ) -> Result<Cost, SolveError> {
-        let LossParameters { friction, wear_rate_mm3_per_nm, bearing } = parameters;
+        losses: &mut Losses,
+    ) -> Cost {
         let mechanism = Mechanism::of_sweep(self.drive, sweep);
         let turning_rad_per_s = input_speed_rpm.map(|speed_rpm| mechanism.turning_rad_per_s(speed_rpm));
-        let wear = wear_rate_mm3_per_nm
-            .zip(turning_rad_per_s)
-            .map(|(rate_mm3_per_nm, turning_rad_per_s)| {
-                let wear = WearParameters { rate_mm3_per_nm, turning_rad_per_s };
-                Wear::of(self.drive, load, sweep, losses, friction, &wear, stop)
-            })
-            .transpose()?;
-        Ok(Cost {
+        Cost {
             input_torque_nm: load.input_torque_nm(self.drive),
             input_speed_rpm: *input_speed_rpm,
             share_of_time: *share_of_time,
             mean: losses.mean,
             pressure_velocity: turning_rad_per_s.map(|turning| losses.pressure_velocity_peaks(sweep, turning)),
-            wear,
-            bearing: bearing
+            wear: losses.wear.take(),
+            bearing: parameters
+                .bearing
                 .zip(forces)
                 .and_then(|(rating, forces)| BearingLoad::of(&mechanism, rating.element, sweep, losses, forces)),
-        })
+        }
     }
 }
 
@@ -334,11 +331,8 @@ impl Costs<'_> {
     }
 
     fn wear(&self, states: &States) -> Option<PerContact<WornPlace>> {
-        let points: Option<Vec<_>> = self
-            .points
-            .iter()
-            .map(|point| Some(WearForTime { share_of_time: point.share_of_time, wear: point.wear.as_ref()? }))
-            .collect();
+        let points: Option<Vec<_>> =
+            self.points.iter().map(|point| Some((point.share_of_time, point.wear.as_ref()?))).collect();
         Wear::over_duty(&points?).largest(states)
     }
 
@@ -350,14 +344,14 @@ impl Costs<'_> {
             let turning_rpm = self.mechanism.turning_rad_per_s(point.input_speed_rpm?) * (60.0 / (2.0 * PI));
             let (speed_ratio, load_n) =
                 point.bearing.map_or((0.0, 0.0), |bearing| (bearing.speed_ratio, bearing.mean_load_n));
-            Some(LoadForRevolutions { load_n, revolutions: point.share_of_time * (speed_ratio * turning_rpm) })
+            Some((load_n, point.share_of_time * (speed_ratio * turning_rpm)))
         };
         let Some(loads) = self.points.iter().map(of_point).collect::<Option<Vec<_>>>() else {
             // A single load without a speed.
             return Some(rating.life(only.mean_load_n, None));
         };
         let time: f64 = self.points.iter().map(|point| point.share_of_time).sum();
-        let speed_rpm = loads.iter().map(|load| load.revolutions).sum::<f64>() / time;
+        let speed_rpm = loads.iter().map(|(_, revolutions)| revolutions).sum::<f64>() / time;
         Some(rating.life(rating.element.mean_load_n(&loads), Some(speed_rpm)))
     }
 

@@ -5,9 +5,9 @@ use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
 use crate::gaps::{Deviations, Gaps};
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
-use crate::losses::bearing::{LoadForRevolutions, RollingElement};
+use crate::losses::bearing::RollingElement;
 use crate::losses::wear::{WearParameters, WornPlace};
-use crate::losses::{AtInputAngle, Friction, LoadedTooth, Mechanism, ToothSlip, Turning, mean_over_period};
+use crate::losses::{Friction, LoadedTooth, Mechanism, Turning, mean_over_period};
 use crate::mesh::PlacedTooth;
 use crate::position::{Position, half_lobe_rad};
 use crate::ring::{FlankPoint, TipCorner};
@@ -45,7 +45,7 @@ impl LossByPlace {
         Self::new(Self::PLACES.map(quantity))
     }
 
-    /// Returns the friction power divided by a torque.
+    /// Returns `ν = P/(M0 ω_HS)`: the friction power divided by the wave generator's torque without friction.
     fn of_turning(turning: &Turning, input_torque_nmm: f64) -> Self {
         let PerContact { wave_generator, ring, carrier } = turning.work_nmm_per_rad;
         let work_nmm_per_rad = [wave_generator, ring, carrier, turning.bearing_work_nmm_per_rad];
@@ -73,6 +73,8 @@ pub struct Losses {
     pub rolls: Vec<Option<Contact>>,
     /// `v_R` at each input angle; 0 without a race.
     pub race_mm_per_rad: Vec<f64>,
+    /// Wear of the parts, if asked for.
+    pub wear: Option<Wear>,
 }
 
 impl Mechanism {
@@ -83,7 +85,7 @@ impl Mechanism {
 }
 
 impl Losses {
-    /// Returns the losses over the sweep of this drive under this load.
+    /// Returns the losses over the sweep of this drive under this load, with the wear at these parameters.
     ///
     /// ```
     /// use toothwave_solver::losses::period::Losses;
@@ -100,7 +102,7 @@ impl Losses {
     ///     carrier_coefficient: 0.05,
     /// })
     /// .unwrap();
-    /// let losses = Losses::of(&drive, &load, &sweep, &friction, &Never).unwrap();
+    /// let losses = Losses::of(&drive, &load, &sweep, &friction, None, &Never).unwrap();
     /// let efficiency = Mechanism::of(&drive).efficiency(Fixed::Ring, losses.mean.total());
     /// assert!(efficiency.driven > 0.0 && efficiency.driven < 1.0);
     /// ```
@@ -112,6 +114,7 @@ impl Losses {
         load: &LoadCase,
         sweep: &Sweep,
         friction: &Friction,
+        wear: Option<&WearParameters>,
         stop: &dyn Stop,
     ) -> Result<Self, SolveError> {
         let mechanism = Mechanism::of_sweep(drive, sweep);
@@ -124,24 +127,37 @@ impl Losses {
         let mut rolls = Vec::with_capacity(states.len());
         let mut ratios = Vec::with_capacity(sweep.input_angles.input_angle_deg.len());
         let mut race_mm_per_rad = Vec::with_capacity(ratios.capacity());
+        let wear =
+            wear.map(|parameters| LoadedDrive::new(drive, load).map(|loaded| (parameters, loaded))).transpose()?;
+        let mut mm_per_hour = PerContact::of(|_| Vec::new());
+        let mut of_race = Vec::new();
         at_each_input_angle(drive, states, stop, |input_angle_deg, teeth| {
-            let teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
-            let turning = mechanism.turning(friction, &teeth);
+            let loaded_teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
+            let turning = mechanism.turning(friction, &loaded_teeth);
             ratios.push((input_angle_deg, LossByPlace::of_turning(&turning, input_torque_nmm)));
             race_mm_per_rad.push(turning.race_mm_per_rad);
             for slip in &turning.teeth {
-                for (contact, &slip) in slip.slip_mm_per_rad.iter() {
-                    slip_mm_per_rad.get_mut(contact).push(slip);
-                }
+                push(&mut slip_mm_per_rad, &slip.slip_mm_per_rad);
                 rolls.push(slip.rolls);
+            }
+            if let Some((parameters, loaded)) = &wear {
+                let mut on_race = 0.0;
+                for (ToothOfState { center, flank, loaded: tooth }, slip) in teeth.iter().zip(&turning.teeth) {
+                    let line_load = loaded.line_load_n_per_mm(center, flank, &tooth.force_n)?;
+                    let depth = mechanism.wear_mm_per_hour(friction, parameters, tooth, slip, &line_load);
+                    on_race += depth.wave_generator;
+                    push(&mut mm_per_hour, &depth);
+                }
+                of_race.push((input_angle_deg, on_race));
             }
             Ok(())
         })?;
+        let race_mm_per_hour = friction.bearing().map(|_| mean_over_period(&of_race));
+        if race_mm_per_hour.is_some() {
+            mm_per_hour.wave_generator.clear();
+        }
         let mean = |of: fn(&LossByPlace) -> f64| {
-            let column: Vec<_> = ratios
-                .iter()
-                .map(|(input_angle, ratio)| AtInputAngle { input_angle: *input_angle, value: of(ratio) })
-                .collect();
+            let column: Vec<_> = ratios.iter().map(|(input_angle_deg, ratio)| (*input_angle_deg, of(ratio))).collect();
             mean_over_period(&column)
         };
         Ok(Self {
@@ -150,6 +166,7 @@ impl Losses {
             slip_mm_per_rad,
             rolls,
             race_mm_per_rad,
+            wear: wear.map(|_| Wear { mm_per_hour, race_mm_per_hour }),
         })
     }
 
@@ -219,61 +236,15 @@ pub struct Wear {
     pub race_mm_per_hour: Option<f64>,
 }
 
-/// Wear of one point of a duty.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WearForTime<'a> {
-    /// The point's share of the running time, or any quantity proportional to it.
-    pub share_of_time: f64,
-    /// Wear at this point.
-    pub wear: &'a Wear,
-}
-
 impl Wear {
-    /// Returns the wear of the sweep that these losses belong to.
-    ///
-    /// # Errors
-    /// The errors of [`Losses::of`].
-    pub fn of(
-        drive: &Drive,
-        load: &LoadCase,
-        sweep: &Sweep,
-        losses: &Losses,
-        friction: &Friction,
-        parameters: &WearParameters,
-        stop: &dyn Stop,
-    ) -> Result<Self, SolveError> {
-        let (mechanism, loaded) = (Mechanism::of_sweep(drive, sweep), LoadedDrive::new(drive, load)?);
-        let mut mm_per_hour = PerContact::of(|_| Vec::with_capacity(sweep.states.len()));
-        let mut of_race = Vec::new();
-        at_each_input_angle(drive, &sweep.states, stop, |input_angle, teeth| {
-            let mut on_race = 0.0;
-            for ToothOfState { state, center, flank, loaded: tooth } in teeth {
-                let line_load = loaded.line_load_n_per_mm(center, flank, &tooth.force_n)?;
-                let slip_mm_per_rad = PerContact::of(|contact| losses.slip_mm_per_rad.get(contact)[*state]);
-                let slip = ToothSlip { slip_mm_per_rad, rolls: losses.rolls[*state] };
-                let depth = mechanism.wear_mm_per_hour(friction, parameters, tooth, &slip, &line_load);
-                on_race += depth.wave_generator;
-                for (contact, &depth) in depth.iter() {
-                    mm_per_hour.get_mut(contact).push(depth);
-                }
-            }
-            of_race.push(AtInputAngle { input_angle, value: on_race });
-            Ok(())
-        })?;
-        let race_mm_per_hour = friction.bearing().map(|_| mean_over_period(&of_race));
-        if race_mm_per_hour.is_some() {
-            mm_per_hour.wave_generator.clear();
-        }
-        Ok(Self { mm_per_hour, race_mm_per_hour })
-    }
-
-    /// Returns the mean over a duty of at least one point, weighted by time. All points have the same input angles. It
-    /// is taken at each place, since depths add there.
-    pub fn over_duty(points: &[WearForTime<'_>]) -> Self {
-        let time: f64 = points.iter().map(|point| point.share_of_time).sum();
+    /// Returns the mean over a duty of at least one point, each with its share of time or any quantity proportional to
+    /// it. All points have the same input angles. It is taken at each place, since depths add there.
+    pub fn over_duty(points: &[(f64, &Self)]) -> Self {
+        let time: f64 = points.iter().map(|(share_of_time, _)| share_of_time).sum();
         let mean = |of: &dyn for<'a> Fn(&'a Self) -> &'a [f64]| -> Vec<f64> {
-            let at = |place: usize| points.iter().map(|point| point.share_of_time * of(point.wear)[place]).sum::<f64>();
-            let places = points.first().map_or(0, |point| of(point.wear).len());
+            let at =
+                |place: usize| points.iter().map(|(share_of_time, wear)| share_of_time * of(wear)[place]).sum::<f64>();
+            let places = points.first().map_or(0, |(_, wear)| of(wear).len());
             (0..places).map(|place| at(place) / time).collect()
         };
         Self {
@@ -293,6 +264,13 @@ impl Wear {
     /// Returns the largest depth of each part and its place; none for a race.
     pub fn peaks(&self, states: &States) -> PerContact<Option<Peak>> {
         PerContact::of(|contact| largest(states, self.mm_per_hour.get(contact).iter().copied()))
+    }
+}
+
+/// Adds a value to the column of each contact.
+fn push(columns: &mut PerContact<Vec<f64>>, values: &PerContact<f64>) {
+    for (contact, &value) in values.iter() {
+        columns.get_mut(contact).push(value);
     }
 }
 
@@ -334,22 +312,26 @@ impl BearingLoad {
             turned_deg += step_deg;
             // Half of the interval at either end, as in the means over a period.
             for end in [at - 1, at] {
-                let revolutions = 0.5 * step_deg * speed_ratio(end);
-                loads.push(LoadForRevolutions { load_n: forces.force_n[end], revolutions });
+                loads.push((forces.force_n[end], 0.5 * step_deg * speed_ratio(end)));
             }
         }
-        let revolutions: f64 = loads.iter().map(|load| load.revolutions).sum();
+        let revolutions: f64 = loads.iter().map(|(_, revolutions)| revolutions).sum();
         (revolutions > 0.0)
             .then(|| Self { mean_load_n: element.mean_load_n(&loads), speed_ratio: revolutions / turned_deg })
     }
 }
 
-/// Transverse force of the teeth on the wave generator at each input angle of a sweep, in its frame.
+/// Radial force of the teeth on the wave generator, if no two lobes carry the same load: columns of equal length, one
+/// entry per input angle.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), schema(as = RadialForceAnswer))]
 pub struct RadialForces {
-    /// Magnitude of the force.
+    /// Input angle j.
+    pub input_angle_deg: Vec<f64>,
+    /// Magnitude of the force, in N.
+    #[cfg_attr(feature = "document", serde(rename = "value"))]
     pub force_n: Vec<f64>,
-    /// Direction of the force, from the middle of lobe 0.
+    /// Direction of the force in the wave generator's frame, from the middle of lobe 0.
     pub direction_deg: Vec<f64>,
 }
 
@@ -373,7 +355,7 @@ impl RadialForces {
         let p = load.parameters();
         let gaps = Gaps::new(drive, &p.clearance_um, p.modification, Some(deviations));
         let mut forces = Self::default();
-        at_each_input_angle(drive, &sweep.states, stop, |_, teeth| {
+        at_each_input_angle(drive, &sweep.states, stop, |input_angle_deg, teeth| {
             let mut teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
             if p.wave_generator_moves {
                 let wind_up_rad = sweep.input_angles.wind_up_deg[forces.force_n.len()].to_radians();
@@ -382,6 +364,7 @@ impl RadialForces {
                 }
             }
             let force_n = mechanism.radial_force_n(&teeth);
+            forces.input_angle_deg.push(input_angle_deg);
             forces.force_n.push(force_n.norm());
             forces.direction_deg.push(force_n.y.atan2(force_n.x).to_degrees());
             Ok(())
@@ -437,7 +420,6 @@ fn at_each_input_angle(
 
 /// Tooth of a state, with its contact points.
 struct ToothOfState {
-    state: usize,
     center: ToothCenter,
     flank: FlankPoint,
     loaded: LoadedTooth,
@@ -461,5 +443,5 @@ fn tooth_of(
     let force_n = PerContact::of(|contact| states.force_n.get(contact)[state]);
     let lobe = states.lobe.get(state).copied().unwrap_or_default();
     let loaded = LoadedTooth { corner, ..LoadedTooth::new(lobe, &center, &flank, force_n) };
-    Ok(ToothOfState { state, center, flank, loaded })
+    Ok(ToothOfState { center, flank, loaded })
 }

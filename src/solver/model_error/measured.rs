@@ -1,12 +1,12 @@
 //! Errors of the model against elastic bodies, in per cent. Generated from `tests/finite_elements`: run
 //! `WRITE_MODEL_ERRORS=1 cargo test -p toothwave-solver --test solver -- model_errors_are_generated`.
 
-use super::{Row, row};
+use super::{Measured, row};
 use crate::contact_law::LawName::{Johnson, Linear, Palmgren};
 use crate::load_sharing::Compatibility::{Projection, VirtualWork};
 
 /// Model, its refinements, pointed tips and gaps; errors of force, stress and wind-up.
-pub(super) const MEASURED: [Row; 35] = [
+pub(super) const MEASURED: [Measured; 35] = [
     row(VirtualWork, Johnson, [false, false, false], [false, false], [[-1, 0], [-2, 1], [-2, -1]]),
     row(VirtualWork, Johnson, [false, false, false], [false, true], [[-1, 1], [-5, 3], [-1, 0]]),
     row(VirtualWork, Johnson, [false, false, false], [true, false], [[-3, 7], [-3, 4], [-6, -3]]),

@@ -1,7 +1,6 @@
 //! The quantities, in the order of the tables.
 
 use toothwave_solver::Contact;
-use toothwave_solver::backlash::Backlash;
 use toothwave_solver::mesh::Mesh;
 
 use super::variant::most;
@@ -329,19 +328,19 @@ pub static QUANTITIES: [Quantity; 61] = [
         "backlash_mean_arcmin",
         "Mean backlash at the output over the input angle, without load.",
         "/wind_up/backlash/mean_arcmin",
-        |variant| Ok(variant.backlash(Backlash::mean_arcmin)),
+        |variant| Ok(variant.backlash(|backlash| backlash.mean_arcmin)),
     ),
     backlash(
         "backlash_min_arcmin",
         "Smallest backlash at the output over the input angle. Parts interfere if it is below 0.",
         "/wind_up/backlash/smallest_arcmin",
-        |variant| Ok(variant.backlash(|backlash| backlash.smallest.backlash_arcmin())),
+        |variant| Ok(variant.backlash(|backlash| backlash.smallest_arcmin)),
     ),
     backlash(
         "backlash_max_arcmin",
         "Largest backlash at the output over the input angle.",
         "/wind_up/backlash/largest_arcmin",
-        |variant| Ok(variant.backlash(|backlash| backlash.largest.backlash_arcmin())),
+        |variant| Ok(variant.backlash(|backlash| backlash.largest_arcmin)),
     ),
     of_sweep(
         "radial_force_max_n",
@@ -365,7 +364,7 @@ pub static QUANTITIES: [Quantity; 61] = [
         "MPa",
         "Largest bending stress at the foot of a carrier finger. Balls have none.",
         sweep("/fingers/stress_mpa"),
-        |variant| Ok(variant.fingers(|stress| Some(stress.largest_mpa))),
+        |variant| Ok(variant.fingers(|stress| Some(stress.stress_mpa))),
     )
     .not_below_zero()
     .or_absent(),
@@ -376,7 +375,7 @@ pub static QUANTITIES: [Quantity; 61] = [
             "",
             "Safety of the carrier fingers against yield and fatigue. Below 1 there is a finding. Balls have none.",
             sweep("/fingers/safety"),
-            |variant| Ok(variant.fingers(|stress| stress.safety.map(|safety| safety.least()))),
+            |variant| Ok(variant.fingers(|stress| stress.safety)),
         )
         .not_below_zero()
         .or_absent()
