@@ -317,7 +317,7 @@ impl Drawing {
                     let placement = turned(slot + carrier_turns);
                     let (sin, cos) = placement.rotation_rad.sin_cos();
                     let position_rad = 2.0 * PI * (slot - from_lobe).rem_euclid(1.0);
-                    let center_radius_mm = self.drive.center_radius_at_mm(position_rad)?;
+                    let center_radius_mm = self.drive.flank().locus().center_radius_at_mm(position_rad)?;
                     let origin_mm = Point2::from(center_radius_mm * Vector2::new(cos, sin));
                     Ok(Placement { origin_mm, ..placement })
                 });

@@ -277,11 +277,6 @@ impl Drive {
         self.neighbours().least_center_distance_mm()
     }
 
-    /// Returns `d` at any angle from a lobe.
-    pub(crate) fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
-        self.ring.flank.locus().center_radius_at_mm(angle_rad)
-    }
-
     /// Returns the least thickness of the wall between two neighbouring slots. It is at the carrier's inner edge, on
     /// the circle of the cam's outer radius `a`: `2 (√(a² - w²) sin(π/Z'_G) - w cos(π/Z'_G))`, with w half the slot's
     /// width. The result is not positive if the slots overlap there.

@@ -149,11 +149,6 @@ impl CarrierFingers {
         Ok(Self { beam, parameters, overhang, moment_nmm_per_n, moment_nmm_per_nm, slot })
     }
 
-    /// Returns the beam.
-    pub const fn beam(&self) -> &FingerBeam {
-        &self.beam
-    }
-
     fn fillet_radius_mm(&self) -> f64 {
         self.parameters.fillet_radius_mm.unwrap_or(FILLET_SHARE_OF_THICKNESS * self.beam.thickness_mm)
     }

@@ -105,11 +105,6 @@ pub enum Fixed {
     WaveGenerator,
 }
 
-impl Fixed {
-    /// All three fixed members.
-    pub const ALL: [Self; 3] = [Self::Ring, Self::Carrier, Self::WaveGenerator];
-}
-
 /// Efficiency with one member fixed, for a given torque at the driven end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Efficiency {

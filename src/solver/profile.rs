@@ -7,7 +7,7 @@ use nalgebra::{Point2, Rotation2, Unit, Vector2};
 use crate::cam::CurvePoint;
 use crate::drive::Drive;
 use crate::locus::Locus;
-use crate::position::{Position, half_lobe_rad};
+use crate::position::Position;
 use crate::ring::{FlankEnd, FlankLimit, RingFlank};
 use crate::root::NotConverged;
 use crate::{SolveError, Stop};
@@ -182,7 +182,7 @@ pub(crate) fn flank_curve(
     stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = flank.locus().lobes();
-    sampled(Position::lobe(lobes), limit.position, lobes, density, stop, |position| {
+    sampled(Position::lobe(lobes), limit.position, density, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
         Ok(CurvePoint {
@@ -197,7 +197,7 @@ pub(crate) fn flank_curve(
 fn path_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let flank = drive.flank();
     let lobes = drive.lobes();
-    let mut points = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, density, stop, |position| {
+    let mut points = sampled(Position::lobe(lobes), Position::valley(lobes), density, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
         let angle_rad = position.from_lobe_rad / flank.teeth_per_wave();
@@ -225,7 +225,7 @@ pub(crate) fn cam_half_lobe(
 ) -> Result<SampledCurve, SolveError> {
     let lobes = locus.lobes();
     let outline = |place| locus.cam_outline(clearance_mm, place);
-    let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), lobes, density, stop, outline)?;
+    let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), density, stop, outline)?;
     // The last point is on the valley's line.
     if let Some(last) = curve.points.last_mut() {
         *last = Point2::from(last.coords.norm() * direction(1, 2 * lobes));
@@ -290,13 +290,12 @@ fn on_circle(radius_mm: f64, angle_rad: f64) -> Point2<f64> {
 pub(crate) fn sampled(
     start: Position,
     end: Position,
-    lobes: u32,
     Density { tolerance_mm, points_per_chord, max_chords }: Density,
     stop: &dyn Stop,
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
 ) -> Result<SampledCurve, SolveError> {
     // Measured from the valley, where cusps are. Beyond the middle a `Position` is as precise from the other side.
-    let half_rad = half_lobe_rad(lobes);
+    let (lobes, half_rad) = (start.lobes, start.half_lobe_rad());
     let at = |x: f64| {
         if x <= end.from_valley_rad {
             curve(end)

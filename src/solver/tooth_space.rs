@@ -138,15 +138,12 @@ impl ToothSpace {
         }
     }
 
-    /// Returns the flank at its distance from the path, without other shaping.
-    pub(crate) const fn set_back_flank(&self) -> &RingFlank {
-        &self.set_back.flank
-    }
-
-    /// Returns true if both flanks end at their crossing because of their distance from the path, although the drive's
-    /// reach a regular tip.
-    pub(crate) fn is_undercut_by_distance(&self) -> bool {
-        self.set_back.limit.end == FlankEnd::Undercut
+    /// Returns the flank's distance from the path, and the least one that undercuts it, if both flanks end at their
+    /// crossing because of that distance.
+    pub(crate) fn undercutting_distance_mm(&self) -> Option<(f64, f64)> {
+        let RingTooth { flank, limit, .. } = &self.set_back;
+        let critical_mm = flank.critical_distance_mm().filter(|_| limit.end == FlankEnd::Undercut)?;
+        Some((flank.distance_mm(), critical_mm))
     }
 
     /// Returns the largest radius of the space: that of the root, or of a tip relief beyond it.
@@ -171,7 +168,7 @@ impl ToothSpace {
         let mut pieces = Vec::new();
         let mut piece = |from: Position, to: Position, is_relieved: bool| {
             let curve = |place| flank.curve_point(place, [from, to], is_relieved);
-            pieces.push(sampled(from, to, lobes, density, stop, curve)?);
+            pieces.push(sampled(from, to, density, stop, curve)?);
             Ok::<_, SolveError>(())
         };
         let relieved_from = flank.relief.map(|relief| Position::from_lobe(relief.start_rad, lobes));

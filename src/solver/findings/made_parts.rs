@@ -30,14 +30,11 @@ pub(crate) fn of_made_part(drive: &Drive, part: &MadePart) -> Result<Vec<Finding
 }
 
 fn of_ring(drive: &Drive, space: &ToothSpace, outer_radius_mm: f64) -> Vec<Finding> {
-    let flank = space.set_back_flank();
     let thin = thin_wall(drive, Contact::Ring, outer_radius_mm - space.outermost_radius_mm());
     let mut findings: Vec<_> = thin.into_iter().chain(groove_not_drawn(drive, Contact::Ring)).collect();
-    if space.is_undercut_by_distance()
-        && !drive.flank().is_undercut()
-        && let Some(critical_distance_mm) = flank.critical_distance_mm()
+    if let Some((distance_mm, critical_mm)) = space.undercutting_distance_mm().filter(|_| !drive.flank().is_undercut())
     {
-        findings.push(Finding::warning(Code::ClearanceUndercutsRing, flank.distance_mm(), critical_distance_mm));
+        findings.push(Finding::warning(Code::ClearanceUndercutsRing, distance_mm, critical_mm));
     }
     findings
 }

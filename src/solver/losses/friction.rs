@@ -80,11 +80,6 @@ impl Friction {
         if violations.is_empty() { Ok(friction) } else { Err(violations) }
     }
 
-    /// Returns the unchecked parameters.
-    pub const fn parameters(&self) -> &FrictionParameters {
-        &self.0
-    }
-
     /// Returns `μ_c`; none if the race has no friction on the teeth.
     fn coefficient(&self) -> PerContact<f64> {
         let wave_generator = match self.0.wave_generator {
