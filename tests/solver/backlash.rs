@@ -341,6 +341,7 @@ impl Bodies<'_> {
                 let d = mean_path_radius_mm + amplitude_mm * phase.cos();
                 (d * unit(parameter), parameter + (amplitude_mm * u * phase.sin() / d).atan())
             }
+            other => panic!("no rigid body of {other:?}"),
         }
     }
 

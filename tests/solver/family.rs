@@ -159,6 +159,7 @@ fn center_radius_mm(p: &DriveParameters, psi: f64) -> f64 {
         WaveGenerator::HarmonicPath { lobes, mean_path_radius_mm, amplitude_mm } => {
             mean_path_radius_mm + amplitude_mm * (lobes as f64 * psi).cos()
         }
+        other => panic!("no path of {other:?}"),
     }
 }
 

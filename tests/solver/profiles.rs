@@ -59,6 +59,7 @@ fn closed_forms(p: &DriveParameters) -> [Polyline; 3] {
             WaveGenerator::HarmonicPath { mean_path_radius_mm, amplitude_mm: e, .. } => {
                 Err((mean_path_radius_mm + e * (lobes * angle).cos(), e * lobes * (lobes * angle).sin()))
             }
+            other => panic!("no profile of {other:?}"),
         };
         let (psi, d, tan, normal) = match support {
             Ok((h, slope)) => {

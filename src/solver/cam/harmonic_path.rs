@@ -115,6 +115,10 @@ impl HarmonicPath {
 }
 
 impl Kind for HarmonicPath {
+    fn is_path(&self) -> bool {
+        true
+    }
+
     fn lobes(&self) -> u32 {
         self.lobes
     }

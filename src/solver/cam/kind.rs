@@ -121,6 +121,11 @@ pub(crate) trait Kind {
     /// every new kind has to answer.
     fn hollow(&self) -> Option<(f64, f64)>;
 
+    /// Returns true if the path of the tooth centres is given, so that it is the same for all tooth radii.
+    fn is_path(&self) -> bool {
+        false
+    }
+
     /// Returns a tooth radius below which neighbouring teeth cannot touch, with `sin` of half the angle between them.
     /// No centre is closer to the axis than `d_v`, and `d_v sin > r` is sufficient.
     fn surely_free_radius_mm(&self, sin: f64) -> f64 {

@@ -19,6 +19,7 @@ pub use kind::{CamContact, ToothCenter};
 
 /// Parameters of a wave generator, not yet checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum WaveGenerator {
     /// An ellipse: two lobes.
     Ellipse {
@@ -56,6 +57,7 @@ pub enum WaveGenerator {
 
 /// A wave generator with checked parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Cam {
     /// An ellipse.
     Ellipse(Ellipse),

@@ -20,6 +20,7 @@ pub(crate) use term::{LogarithmicTerm, Term};
 
 /// Contact law: relation of force and approach of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum ContactLaw {
     /// `F = k δ` \[7\] with `k = π L1 E*/2`, of two parallel cylinders in line contact (Yang and Sun 1985).
     Linear,

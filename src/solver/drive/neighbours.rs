@@ -97,7 +97,7 @@ impl Neighbours {
     fn touching_radius_mm(&self, center_distance_mm: f64) -> Result<f64, NotConverged> {
         match self.locus.cam() {
             Cam::Ellipse(cam) if self.installed > 3 => return self.touching_radius_of_ellipse_mm(cam),
-            Cam::HarmonicPath(_) => return Ok(0.5 * center_distance_mm),
+            cam if cam.kind().is_path() => return Ok(0.5 * center_distance_mm),
             _ => {}
         }
         let free_mm = 0.5 * self.surely_free_radius_mm();
