@@ -214,8 +214,8 @@ def kinds(document):
         for variant in variants:
             rows = document.rows({**variant, "properties": {name: field for name, field in variant["properties"].items() if name not in common}}, place)
             (kind,) = variant["properties"][word]["enum"]
-            # A list has no field in a form.
-            found[place][kind] = [kind_field(path, field, is_required) for path, field, is_required in rows if "/0" not in path]
+            # Numbers and choices alone have a field in a form.
+            found[place][kind] = [kind_field(path, field, is_required) for path, field, is_required in rows if "/0" not in path and field.keys() & {"enum", "minimum"}]
     return found
 
 

@@ -2,6 +2,7 @@
 
 import { at, changed, compatibilityOf, isSame, lawOf } from './design.js';
 import { html, setAttributes, setProperties, setText } from './dom.js';
+import { kindName } from './field.js';
 import { fixed, number } from './format.js';
 import { ask } from './service.js';
 import { labelled, t } from './texts.js';
@@ -11,7 +12,7 @@ const WANTED = '/accuracy/requested_error';
 const WANTED_ERRORS = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10];
 const WANTED_PRESET = 1e-6;
 
-const modelName = ({ compatibility, law }) => t('accuracy.model', { compatibility: t(`term.${compatibility}.title`), law: t(`option./model/stiffness.${law}`).split(/[,，]/)[0] });
+const modelName = ({ compatibility, law }) => t('accuracy.model', { compatibility: t(`term.${compatibility}.title`), law: kindName('/model/stiffness', law).split(/[,，]/)[0] });
 const pointsName = ({ samples, tolerance }) => (samples === undefined ? t('summary.tolerance', { tolerance: number(tolerance, 1) }) : t('summary.samples', { count: samples }));
 
 /** What of a design the measurement depends on. */

@@ -60,14 +60,14 @@ export function sizeOf(design) {
   return { mean: tidy(mean), stroke: tidy(stroke), low: tidy(mean - stroke), high: tidy(mean + stroke), path: tidy(mean + toothRadius) };
 }
 
-/** Laws suit shapes: balls have Hertz's, and only they; and Hertz's wants virtual work. */
+/** Laws suit shapes: balls have Hertz's, and only they; a law outside `PROJECTED` needs virtual work. */
 export function withLaw(design) {
   const isSuited = lawOf(design) === 'fixed' || isBall(design) === (lawOf(design) === 'hertz');
   const suited = isSuited ? design : changed(design, '/model/stiffness', undefined);
   return !PROJECTED.has(lawOf(suited)) ? changed(suited, '/model/compatibility', 'virtual_work') : suited;
 }
 
-/** Johnson's law gives way to the linear one where approaches are projected. */
+/** Where approaches are projected, a law that `projection` does not take becomes the linear one. */
 export const withProjectedLaw = (design) =>
   compatibilityOf(design) === 'projection' && !PROJECTED.has(lawOf(design)) ? changed(design, '/model/stiffness', { law: 'linear' }) : design;
 

@@ -24,13 +24,16 @@ export function nameOf(pointer, groups) {
   return { label: capital(words), unit: isUnit ? UNITS[unit] : '' };
 }
 
+/** A kind in words, or by its name in the document. */
+export const kindName = (pointer, value) => textOf(`option.${pointer}.${value}`) ?? capital(value.replaceAll('_', ' '));
+
 /** The kinds that have no entry in the form, with the fields that the API document gives them. */
 const otherKinds = (pointer, options, suits) => {
   const listed = new Set(options.map(({ value }) => value));
   return Object.entries(KINDS[pointer]).filter(([value]) => !listed.has(value)).map(([value, fields]) => ({
     value,
     suits,
-    label: textOf(`option.${pointer}.${value}`) ?? capital(value.replaceAll('_', ' ')),
+    label: kindName(pointer, value),
     fields: fields.map(({ pointer: place, unit, choices, is_whole: isWhole, is_required: isRequired }) => {
       const own = { label: textOf(`label.${place}`) ?? nameOf(place, 2).label };
       if (choices) return { ...unlessSaid(place, choices.map((choice) => ({ value: choice, label: choice }))), ...own };
