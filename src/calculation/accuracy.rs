@@ -232,7 +232,7 @@ impl Converged {
     fn new(checked: &CheckedAccuracy, load: &LoadCase, stop: &dyn Stop) -> Result<Self, SolveError> {
         let CheckedAccuracy { drive, deviations, backings, max_states, .. } = checked;
         let sweep = sweep_with_deviations(drive, load, deviations, Points::finest(*max_states), stop)?;
-        let shared = backings.shared_estimates(drive, load.parameters(), &sweep.peaks);
+        let shared = backings.estimates_with_shares(drive, load.parameters(), &sweep.peaks);
         let parts = Some((backings, shared.as_deref()));
         let ModelError { measured, beyond, .. } = model_error::of(drive, load, deviations, &sweep, parts)?;
         let is_like = beyond.iter().all(|reason| matches!(reason, Beyond::Law));

@@ -100,7 +100,7 @@ impl CheckedSweep {
     /// Returns the share that a finger of the carrier adds to a tooth's approach at its contacts, at the peaks of the
     /// load. None without an estimate.
     pub fn finger_share(&self, peaks: &PerContact<solver::ContactPeaks>) -> Option<f64> {
-        let estimates = self.backings.shared_estimates(&self.drive, self.load().parameters(), peaks)?;
+        let estimates = self.backings.estimates_with_shares(&self.drive, self.load().parameters(), peaks)?;
         estimates.into_iter().filter(|estimate| estimate.contact == Contact::Carrier).find_map(|finger| finger.share)
     }
 
@@ -274,7 +274,7 @@ impl Question for Sweep {
         let mesh = sweep.mesh;
         let peaks = fingers.as_ref().map_or(sweep.peaks, |fingers| fingers.peaks_along(&sweep.peaks));
         let finger_stress = checked.finger_stress(&sweep.peaks);
-        let shared = backings.shared_estimates(drive, load.parameters(), &sweep.peaks);
+        let shared = backings.estimates_with_shares(drive, load.parameters(), &sweep.peaks);
         let parts = Some((backings, shared.as_deref()));
         let mut found = Vec::from_iter(findings::of_wind_up(drive, load, &sweep));
         found.extend(findings::of_half_widths(drive, load, &sweep.states, checked.load_peak_over_mean()));

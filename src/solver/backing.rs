@@ -298,7 +298,7 @@ impl Backings {
     /// Returns the estimates with their shares at the peaks of a load under the logarithmic law. None for teeth that are
     /// not cylinders, or under other laws, whose own error is as large. A contact with a given series compliance already
     /// includes its backing.
-    pub fn shared_estimates(
+    pub fn estimates_with_shares(
         &self,
         drive: &Drive,
         p: &LoadParameters,

@@ -61,8 +61,11 @@ impl Position {
 
     /// Returns the position at the fraction `numerator / denominator` of a lobe, at most half of it; exact towards both
     /// ends.
+    ///
+    /// # Panics
+    /// If the fraction exceeds one half.
     pub fn of_lobe(numerator: u64, denominator: u64, lobes: u32) -> Self {
-        debug_assert!(2 * u128::from(numerator) <= u128::from(denominator));
+        assert!(2 * u128::from(numerator) <= u128::from(denominator), "more than half a lobe");
         // Below 2^53 for every sweep (lobes × samples × installed teeth), so that the conversions are exact.
         let whole = denominator as f64;
         let from_lobe_rad = 2.0 * PI * (numerator as f64 / (f64::from(lobes) * whole));

@@ -219,6 +219,12 @@ def kinds(document):
     return found
 
 
+def kinds_text(found):
+    """The kinds as JSON, one line for each field."""
+    text = json.dumps(found, ensure_ascii=False, indent=1)
+    return re.sub(r"\{\n {4}([^{}]*?)\n {3}\}", lambda field: "{ " + re.sub(r"\n {4,}", " ", field[1]) + " }", text)
+
+
 def kind_field(path, schema, is_required):
     field = {"pointer": path, "unit": unit(path).replace("°", "deg"), "meaning": " ".join(schema["description"].split())}
     if "enum" in schema:
@@ -317,8 +323,8 @@ def main(binary, is_check):
             "docs/reference/design-document.md": design_document(document),
             "docs/reference/quantities.md": quantities(listed_quantities(address)),
             "docs/reference/settings.md": settings(of(binary, "serve", "--help")),
-            "src/service/page/kinds.js": f"// {KINDS_WRITTEN}\nexport const KINDS = {json.dumps(kinds(document), ensure_ascii=False, indent=1)};\n",
-            "clients/freecad/toothwave_kinds.json": json.dumps(kinds(document), ensure_ascii=False, indent=1) + "\n",
+            "src/service/page/kinds.js": f"// {KINDS_WRITTEN}\nexport const KINDS = {kinds_text(kinds(document))};\n",
+            "clients/freecad/toothwave_kinds.json": kinds_text(kinds(document)) + "\n",
         }
         faults += refused_documents(address)
     for name, text in written.items():

@@ -72,7 +72,7 @@ fn backings(parameters: &DriveParameters, parts: &PartsParameters, support: Supp
 fn shares(parameters: &DriveParameters, load: &LoadParameters, support: Support) -> Option<Vec<Estimate>> {
     let sweep = swept(parameters, load, 50);
     let backings = backings(parameters, &PartsParameters::default(), support);
-    backings.shared_estimates(&drive(parameters), load, &sweep.peaks)
+    backings.estimates_with_shares(&drive(parameters), load, &sweep.peaks)
 }
 
 fn estimate(estimates: &[Estimate], wanted: Backing) -> &Estimate {

@@ -204,7 +204,7 @@ impl Kind for HarmonicPath {
         self.amplitude_mm * ring_teeth * ring_teeth / self.valley_mm()
     }
 
-    /// With an amplitude above `R/(U² + 1)`.
+    /// The valleys are concave if the amplitude exceeds `R/(U² + 1)`.
     fn hollow(&self) -> Option<(f64, f64)> {
         let u = self.lobe_count();
         let limit_mm = self.mean_radius_mm / (u * u + 1.0);

@@ -66,8 +66,8 @@ impl RollingElement {
         }
     }
 
-    /// Returns the constant load with the same life as these radial loads: `(Σ n F^p/Σ n)^(1/p)`. With each load is its
-    /// number of revolutions, or any quantity proportional to it.
+    /// Returns the constant load with the same life as these radial loads: `(Σ n F^p/Σ n)^(1/p)`. Each load
+    /// has its number of revolutions, or any quantity proportional to it.
     pub fn mean_load_n(self, loads: &[(f64, f64)]) -> f64 {
         let largest_n = loads.iter().map(|&(load_n, _)| load_n).fold(0.0, f64::max);
         if largest_n <= 0.0 {

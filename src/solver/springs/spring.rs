@@ -55,9 +55,9 @@ impl Gap {
 }
 
 impl Spring {
-    /// Builds the spring of a tooth with a gap (or none). The arm applies after the
-    /// common lost motion. A tooth without an arm never closes a gap, unless the arm grows with the rotation. A tooth
-    /// whose arm becomes zero first does not close it either.
+    /// Builds the spring of a tooth with a gap (or none). The arm applies after the common lost motion. A tooth without
+    /// an arm never closes a gap, unless the arm grows with the rotation. A tooth whose arm becomes zero first does not
+    /// close it either.
     pub(crate) fn new(
         arm_mm: f64,
         usual_rad: f64,
