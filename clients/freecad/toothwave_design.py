@@ -1,6 +1,7 @@
 """The design document as a table of fields: what the object's properties and the dialog are made of. No FreeCAD here."""
 
 import json
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -255,7 +256,8 @@ def _with_kinds(fields):
 
 
 def _unlisted(place, group, field, shown):
-    words = field["pointer"][len(place) + 1 :].replace("/", ", ").replace("_", " ").capitalize()
+    unit = field.get("unit", "").lower().replace("/", "_per_")
+    words = re.sub(f"_{unit}(?=/|$)", "", field["pointer"][len(place) + 1 :]).replace("/", ", ").replace("_", " ").capitalize()
     name = "".join(word.title() for word in words.replace(",", "").split())
     if "choices" in field:
         return Field(field["pointer"], name, words, group, BY_DEFAULT, blank="left out", choices=(BY_DEFAULT, *field["choices"]), shown=shown)

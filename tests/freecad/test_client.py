@@ -318,7 +318,7 @@ class Document(unittest.TestCase):
     def test_a_field_of_a_kind_without_an_entry_has_its_name_and_range(self):
         listed = [field for field in toothwave_design.FIELDS if not field.pointer.endswith("mean_path_radius_mm")]
         (found,) = (field for field in toothwave_design._with_kinds(listed) if field.pointer.endswith("mean_path_radius_mm"))
-        self.assertEqual((found.label, found.name, found.unit, found.start), ("Mean path radius mm", "MeanPathRadiusMm", "mm", 1.0))
+        self.assertEqual((found.label, found.name, found.unit, found.start), ("Mean path radius", "MeanPathRadius", "mm", 1.0))
         self.assertEqual((found.limits, found.shown), (toothwave_design.LENGTH_MM, ("WaveGeneratorKind", ("harmonic_path",))))
 
 
