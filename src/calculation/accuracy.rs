@@ -10,7 +10,8 @@ use toothwave_solver::mesh::Samples;
 use toothwave_solver::model_error::{self, Beyond, ModelError};
 use toothwave_solver::sweep::{ContactPeaks, Points, Tolerance, sweep_with_deviations};
 use toothwave_solver::{
-    Compatibility, ContactLaw, Deviations, Drive, LawName, LoadCase, LoadParameters, PerContact, SolveError, Stop,
+    Compatibility, ContactLaw, Deviations, Drive, LawName, LoadCase, LoadParameters, Parameter, PerContact, SolveError,
+    Stop,
 };
 use utoipa::ToSchema;
 
@@ -20,10 +21,8 @@ use crate::json::word;
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 use crate::question::{Limits, Question, checked_drive, checked_load};
 
-/// Tested numbers of samples.
 const SAMPLES: [u64; 9] = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 
-/// Tested tolerances.
 const TOLERANCES: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
 
 /// Most timed runs for the median, and the time after which no further run begins.
@@ -119,35 +118,31 @@ impl Question for Accuracy {
         "accuracy".into()
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
-        let Design { materials, load, modification, deviations, accuracy, parts, .. } = design;
-        let of_parts = (modification, deviations, parts.under_load());
-        (design.drive_in_key(), materials, load, design.model_in_key(), of_parts, accuracy)
+    fn reads(&self, design: &Design) -> impl Serialize {
+        let Design { drive, materials, load, model, modification, deviations, accuracy, parts, .. } = design.in_key();
+        (drive, materials, load, model, (modification, deviations, parts), accuracy)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedAccuracy, NoAnswer> {
         let mut violations = Vec::new();
         let draft = checked_drive(design, &mut violations)?;
         let load = checked_load(design, &draft, &mut violations)?;
-        match (draft.drive(), load, design.requested_error()) {
-            (Some(drive), Some(load), Ok(requested_error)) if violations.is_empty() => {
-                let has_pointed_tips = model_error::has_pointed_tips(&drive);
-                Ok(CheckedAccuracy {
-                    model: design.complete_model(has_pointed_tips),
-                    refinements: design.refinements_by_virtual_work(has_pointed_tips),
-                    backings: Backings::of(&drive, &draft, &design.parts_parameters()?, design.support()),
-                    drive,
-                    load,
-                    deviations: design.deviations.clone(),
-                    requested_error,
-                    max_states: limits.max_searched_states,
-                })
-            }
-            (_, _, requested_error) => {
-                violations.extend(requested_error.err());
-                Err(NoAnswer::impossible(&violations))
-            }
-        }
+        let requested_error = design.accuracy.requested_error;
+        violations.extend(Parameter::RequestedError.check(requested_error));
+        let (Some(drive), Some(load), true) = (draft.drive(), load, violations.is_empty()) else {
+            return Err(NoAnswer::impossible(&violations));
+        };
+        let has_pointed_tips = model_error::has_pointed_tips(&drive);
+        Ok(CheckedAccuracy {
+            model: design.complete_model(has_pointed_tips),
+            refinements: design.refinements_by_virtual_work(has_pointed_tips),
+            backings: Backings::of(&drive, &draft, &design.parts_parameters()?, design.support()),
+            drive,
+            load,
+            deviations: design.deviations.clone(),
+            requested_error,
+            max_states: limits.max_searched_states,
+        })
     }
 
     fn max_bytes(_: &CheckedAccuracy, _: Format) -> Option<u64> {
@@ -157,7 +152,7 @@ impl Question for Accuracy {
     fn answer(checked: &CheckedAccuracy, stop: &dyn Stop) -> Result<AccuracyAnswer, NoAnswer> {
         let &CheckedAccuracy { ref drive, ref load, requested_error, .. } = checked;
         let parameters = *load.parameters();
-        let own = Converged::new(checked, load, stop).map_err(|error| match error {
+        let own = Model::new(checked, &parameters, stop).map_err(|error| match error {
             // No field of the document is wrong, because the reference's tolerance is fixed.
             SolveError::TooManyStates { limit } => NoAnswer::new(
                 NoAnswerCode::TooManyStates,
@@ -167,16 +162,16 @@ impl Question for Accuracy {
             ),
             error => error.into(),
         })?;
-        let (mut ways, mut unavailable) = (Vec::new(), Vec::new());
-        for model in models(drive, &parameters, checked.refinements) {
-            let (compatibility, law) = (model.compatibility, model.law.name());
-            match Model::new(checked, &model, &own.peaks, stop) {
-                Ok(model) => model.measure(&mut ways, stop)?,
+        let (mut ways, mut unavailable) = (own.measured(&own, stop)?, Vec::new());
+        for other in other_models(drive, &parameters, checked.refinements) {
+            match Model::new(checked, &other, stop) {
+                Ok(model) => ways.extend(model.measured(&own, stop)?),
                 Err(SolveError::Stopped) => return Err(NoAnswer::stopped()),
-                Err(error) => {
-                    let code = NoAnswer::from(error).code;
-                    unavailable.push(UnavailableAnswer { compatibility, law, code });
-                }
+                Err(error) => unavailable.push(UnavailableAnswer {
+                    compatibility: other.compatibility,
+                    law: other.law.name(),
+                    code: NoAnswer::from(error).code,
+                }),
             }
         }
         let is_own = |way: &&WayAnswer| {
@@ -197,14 +192,14 @@ impl Question for Accuracy {
     }
 }
 
-/// Returns the design's own model, then every other form of compatibility with each law that is possible for it and the
-/// teeth, and that needs no further numbers.
-fn models(drive: &Drive, own: &LoadParameters, refinements: Refinements) -> Vec<LoadParameters> {
+/// Returns every other model: each form of compatibility with each law that is possible for it and the teeth. A law
+/// with numbers is compared only if it is the design's own.
+fn other_models(drive: &Drive, own: &LoadParameters, refinements: Refinements) -> Vec<LoadParameters> {
     let others = ContactLaw::WITHOUT_NUMBERS.into_iter().filter(|law| law.suits(&drive.parameters().tooth));
     // Other numbers would be another model with the same name.
     let others = others.map(|law| if law.name() == own.law.name() { own.law } else { law });
     let laws: Vec<_> = std::iter::once(own.law).chain(others).collect();
-    let mut models = vec![*own];
+    let mut models = Vec::new();
     for compatibility in [Compatibility::Projection, Compatibility::VirtualWork] {
         for &law in &laws {
             let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = match compatibility {
@@ -214,31 +209,12 @@ fn models(drive: &Drive, own: &LoadParameters, refinements: Refinements) -> Vec<
             let model =
                 LoadParameters { compatibility, law, ring_teeth_bend, wave_generator_moves, corner_contact, ..*own };
             let is_possible = compatibility == Compatibility::VirtualWork || law.is_of_projection();
-            if is_possible && !models.contains(&model) {
+            if is_possible && model != *own && !models.contains(&model) {
                 models.push(model);
             }
         }
     }
     models
-}
-
-/// Converged peaks of a model, and the largest error of its forces that was measured in similar drives.
-struct Converged {
-    peaks: PerContact<ContactPeaks>,
-    expected_error: Option<f64>,
-}
-
-impl Converged {
-    fn new(checked: &CheckedAccuracy, load: &LoadCase, stop: &dyn Stop) -> Result<Self, SolveError> {
-        let CheckedAccuracy { drive, deviations, backings, max_states, .. } = checked;
-        let sweep = sweep_with_deviations(drive, load, deviations, Points::finest(*max_states), stop)?;
-        let shared = backings.estimates_with_shares(drive, load.parameters(), &sweep.peaks);
-        let parts = Some((backings, shared.as_deref()));
-        let ModelError { measured, beyond, .. } = model_error::of(drive, load, deviations, &sweep, parts)?;
-        let is_like = beyond.iter().all(|reason| matches!(reason, Beyond::Law));
-        let expected_error = measured.filter(|_| is_like).map(|measured| measured.force.largest());
-        Ok(Self { peaks: sweep.peaks, expected_error })
-    }
 }
 
 /// Returns the largest relative difference of six peaks from their reference.
@@ -254,44 +230,43 @@ fn difference(peaks: &PerContact<ContactPeaks>, reference: &PerContact<ContactPe
 struct Model<'a> {
     checked: &'a CheckedAccuracy,
     load: LoadCase,
-    reference: Converged,
-    difference: f64,
+    peaks: PerContact<ContactPeaks>,
+    /// Largest error of its forces that was measured in similar drives.
+    expected_error: Option<f64>,
 }
 
 impl<'a> Model<'a> {
-    fn new(
-        checked: &'a CheckedAccuracy,
-        parameters: &LoadParameters,
-        own_peaks: &PerContact<ContactPeaks>,
-        stop: &dyn Stop,
-    ) -> Result<Self, SolveError> {
+    fn new(checked: &'a CheckedAccuracy, parameters: &LoadParameters, stop: &dyn Stop) -> Result<Self, SolveError> {
+        let CheckedAccuracy { drive, deviations, backings, max_states, .. } = checked;
         let load = LoadCase::new(parameters).map_err(SolveError::Impossible)?;
         // Some forms of compatibility would turn a gap into load.
-        let violations = parameters.clearance_violations(&Draft::new(checked.drive.parameters())?)?;
+        let violations = parameters.clearance_violations(&Draft::new(drive.parameters())?)?;
         if !violations.is_empty() {
             return Err(SolveError::Impossible(violations));
         }
-        let reference = Converged::new(checked, &load, stop)?;
-        let difference = difference(&reference.peaks, own_peaks);
-        Ok(Self { checked, load, reference, difference })
+        let sweep = sweep_with_deviations(drive, &load, deviations, Points::finest(*max_states), stop)?;
+        let shared = backings.estimates_with_shares(drive, parameters, &sweep.peaks);
+        let parts = Some((backings, shared.as_deref()));
+        let ModelError { measured, beyond, .. } = model_error::of(drive, &load, deviations, &sweep, parts)?;
+        let is_like = beyond.iter().all(|reason| matches!(reason, Beyond::Law));
+        let expected_error = measured.filter(|_| is_like).map(|measured| measured.force.largest());
+        Ok(Self { checked, load, peaks: sweep.peaks, expected_error })
     }
 
     /// Measures every number of samples and every tolerance within the limit on states.
-    fn measure(&self, ways: &mut Vec<WayAnswer>, stop: &dyn Stop) -> Result<(), SolveError> {
+    fn measured(&self, own: &Self, stop: &dyn Stop) -> Result<Vec<WayAnswer>, SolveError> {
         let &CheckedAccuracy { ref drive, ref deviations, max_states, .. } = self.checked;
         let mesh = self.load.mesh(drive, deviations);
         // All of them are within the range.
         let samples = SAMPLES.into_iter().filter_map(|samples| Samples::new(samples).ok());
-        for samples in samples.filter(|&samples| mesh.state_count(samples) <= max_states) {
-            ways.push(self.way(Points::Samples(samples), stop)?);
-        }
-        for tolerance in TOLERANCES.into_iter().filter_map(|value| Tolerance::new(value, max_states).ok()) {
-            ways.push(self.way(Points::Tolerance(tolerance), stop)?);
-        }
-        Ok(())
+        let samples = samples.filter(|&samples| mesh.state_count(samples) <= max_states).map(Points::Samples);
+        let tolerances = TOLERANCES.into_iter().filter_map(|value| Tolerance::new(value, max_states).ok());
+        samples.chain(tolerances.map(Points::Tolerance)).map(|points| self.way(own, points, stop)).collect()
     }
 
-    fn way(&self, points: Points, stop: &dyn Stop) -> Result<WayAnswer, SolveError> {
+    fn way(&self, own: &Self, points: Points, stop: &dyn Stop) -> Result<WayAnswer, SolveError> {
+        /// Fraction of the model's error below which the numerical error is negligible.
+        const FINER: f64 = 0.1;
         let CheckedAccuracy { drive, deviations, .. } = self.checked;
         let begun = Instant::now();
         let mut times_us = Vec::with_capacity(MOST_RUNS);
@@ -308,20 +283,17 @@ impl<'a> Model<'a> {
             Points::Samples(samples) => (Some(samples.count()), None),
             Points::Tolerance(tolerance) => (None, Some(tolerance.relative())),
         };
-        /// Fraction of the model's error below which the numerical error is negligible.
-        const FINER: f64 = 0.1;
         let p = self.load.parameters();
-        let error = difference(&found.peaks, &self.reference.peaks);
-        let expected_model_error = self.reference.expected_error;
+        let error = difference(&found.peaks, &self.peaks);
         Ok(WayAnswer {
             compatibility: p.compatibility,
             law: p.law.name(),
             samples,
             tolerance,
             error,
-            model_difference: self.difference,
-            expected_model_error,
-            is_finer_than_model: expected_model_error.is_some_and(|expected| error < FINER * expected),
+            model_difference: difference(&self.peaks, &own.peaks),
+            expected_model_error: self.expected_error,
+            is_finer_than_model: self.expected_error.is_some_and(|expected| error < FINER * expected),
             solve_us: times_us[times_us.len() / 2],
             states: found.states.len(),
         })

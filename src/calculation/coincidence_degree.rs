@@ -50,8 +50,8 @@ impl Question for CoincidenceDegree {
         "coincidence-degree".into()
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
-        design.drive_in_key()
+    fn reads(&self, design: &Design) -> impl Serialize {
+        design.in_key().drive
     }
 
     fn check(&self, design: &Design, _: &Limits) -> Result<Drive, NoAnswer> {

@@ -5,7 +5,8 @@ use toothwave_solver::drive::Draft;
 use toothwave_solver::{Contact, model_error};
 
 use crate::design::{DEPRECATED_SWITCHES, Design, RefinementsDocument};
-use crate::json::{self, Fault, Tree};
+use crate::field::FieldError;
+use crate::json::{self, Tree};
 use crate::no_answer::NoAnswer;
 
 /// The design document that means the same without deprecated fields.
@@ -71,7 +72,7 @@ fn remove_if_empty(tree: &mut Tree, name: &str) {
 
 /// Moves the gaps of `model.clearance` in the base of a study that does not contradict itself. Fails if the base has a
 /// switch of refinements: they depend on the geometry, which may vary.
-pub fn convert_base(base: &mut Tree) -> Result<(), Fault> {
+pub fn convert_base(base: &mut Tree) -> Result<(), FieldError> {
     let is_in = |pointer: &str| json::path(pointer).is_some_and(|path| base.at(&path).is_some());
     if let Some(switch) = DEPRECATED_SWITCHES.into_iter().find(|switch| is_in(switch)) {
         return Err(no_replacement(switch));
@@ -83,7 +84,7 @@ pub fn convert_base(base: &mut Tree) -> Result<(), Fault> {
 
 /// Returns the pointer of the field that replaces a deprecated one, or the pointer itself. Fails if the field is a
 /// switch of refinements.
-pub fn converted_pointer(pointer: &str) -> Result<String, Fault> {
+pub fn converted_pointer(pointer: &str) -> Result<String, FieldError> {
     if let Some(switch) = DEPRECATED_SWITCHES.into_iter().find(|&switch| switch == pointer) {
         return Err(no_replacement(switch));
     }
@@ -91,9 +92,9 @@ pub fn converted_pointer(pointer: &str) -> Result<String, Fault> {
     Ok(contact.map_or_else(|| pointer.into(), |contact| format!("/parts/{contact}/clearance_um")))
 }
 
-fn no_replacement(switch: &str) -> Fault {
+fn no_replacement(switch: &str) -> FieldError {
     let detail = "what takes its place depends on the geometry, which may vary; choose `model.refinements` instead";
-    Fault::conflict(switch, detail)
+    FieldError::conflict(switch, detail)
 }
 
 struct Written<'a>(&'a Tree);

@@ -4,7 +4,6 @@
 
 use serde::{Deserialize, Serialize};
 use toothwave_solver::backing::Support;
-use toothwave_solver::drawing::DrawingParameters;
 use toothwave_solver::fingers::{FingerParameters, LoadCycle, Strength};
 use toothwave_solver::losses::duty::LossParameters;
 use toothwave_solver::parts::{CarrierRadii, PartsParameters};
@@ -13,16 +12,16 @@ use toothwave_solver::sweep::Points;
 use toothwave_solver::violation::{OfDutyPoint, SHARES_TOLERANCE};
 use toothwave_solver::{
     Deviations, DriveParameters, LoadCase, LoadParameters, Materials, Modification, Parameter, Torque, Violation,
+    WaveGenerator,
 };
 use utoipa::ToSchema;
 
-use crate::field::FieldCode;
-use crate::json::{self, Fault};
+use crate::field::{FieldCode, FieldError};
+use crate::json;
 use crate::no_answer::NoAnswer;
 
 mod asked;
 mod contact_law;
-mod deviations;
 mod drive;
 mod friction;
 mod load;
@@ -84,7 +83,7 @@ pub struct Design {
     pub sweep: SweepDocument,
     /// Sampling of profiles.
     #[serde(default)]
-    pub profile: ProfileDocument,
+    pub profile: ProfileParameters,
     /// Settings of `/v1/accuracy`.
     #[serde(default)]
     pub accuracy: AccuracyDocument,
@@ -121,16 +120,32 @@ pub struct DutyPoint {
 }
 
 /// Returns the torque if exactly one is given.
-fn one_torque(input_nm: Option<f64>, output_nm: Option<f64>, pointer: &str) -> Result<Torque, Fault> {
+fn one_torque(input_nm: Option<f64>, output_nm: Option<f64>, pointer: &str) -> Result<Torque, FieldError> {
     match (input_nm, output_nm) {
         (Some(torque_nm), None) => Ok(Torque::Input(torque_nm)),
         (None, Some(torque_nm)) => Ok(Torque::Output(torque_nm)),
         (Some(_), Some(_)) => {
-            Err(Fault::conflict(pointer, "only one of `input_torque_nm` and `output_torque_nm` may stand here"))
+            Err(FieldError::conflict(pointer, "only one of `input_torque_nm` and `output_torque_nm` may stand here"))
         }
         (None, None) => {
             let detail = "`input_torque_nm` or `output_torque_nm` is required here";
-            Err(Fault::at(pointer, FieldCode::MissingField, detail))
+            Err(FieldError::at(pointer, FieldCode::MissingField, detail))
+        }
+    }
+}
+
+/// Clears each list that has a zero for every item, which is equivalent.
+fn leave_out_zeros(deviations: &mut Deviations, drive: &DriveParameters) {
+    for (list, items) in [
+        (&mut deviations.tooth_radius_um, drive.installed),
+        (&mut deviations.slot_angle_arcsec, drive.installed),
+        (&mut deviations.slot_wall_um, drive.installed),
+        (&mut deviations.ring_space_um, drive.ring_teeth),
+        (&mut deviations.ring_space_angle_arcsec, drive.ring_teeth),
+        (&mut deviations.wave_generator_lobe_um, drive.wave_generator.lobes()),
+    ] {
+        if usize::try_from(items) == Ok(list.len()) && list.iter().all(|&value| value == 0.0) {
+            list.clear();
         }
     }
 }
@@ -147,10 +162,12 @@ impl Design {
             self.sweep.samples.get_or_insert(DEFAULT_SAMPLES);
         }
         let drive = self.drive_parameters();
-        deviations::leave_out_zeros(&mut self.deviations, &drive);
-        self.parts.leave_out_default_supports();
+        leave_out_zeros(&mut self.deviations, &drive);
+        let Support { fingers, rim } = Support::default();
+        self.parts.ring.rim.take_if(|given| *given == rim);
+        self.parts.carrier.fingers.take_if(|given| *given == fingers);
         if let Some(friction) = &mut self.friction {
-            friction.leave_out_zero_wear();
+            friction.wear_rate_mm3_per_nm.take_if(|rates| *rates == WearRatesDocument::default());
         }
         self
     }
@@ -192,12 +209,12 @@ impl Design {
 
     /// Returns the parameters of the load, for a drive with or without pointed or bored tips. Fails without a load, or
     /// without exactly one torque.
-    pub fn load_parameters(&self, has_pointed_tips: bool) -> Result<LoadParameters, Fault> {
+    pub fn load_parameters(&self, has_pointed_tips: bool) -> Result<LoadParameters, FieldError> {
         self.require_one_clearance()?;
         self.require_one_choice_of_refinements()?;
         let load = self.load.as_ref().ok_or_else(|| {
             let detail = "forces need a load: give `load` an `input_torque_nm` or an `output_torque_nm`";
-            Fault::at("/load", FieldCode::MissingField, detail)
+            FieldError::at("/load", FieldCode::MissingField, detail)
         })?;
         let Duty { points, hardest, .. } = self.duty()?;
         Ok(LoadParameters {
@@ -212,9 +229,9 @@ impl Design {
         let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.refinements(has_pointed_tips);
         let CarrierPartDocument { inner_radius_mm, outer_radius_mm, .. } = self.parts.carrier;
         let carrier = match self.drive.teeth {
-            TeethDocument::FlatSided(_) => CarrierRadii { inner_mm: inner_radius_mm, outer_mm: outer_radius_mm },
+            TeethDocument::FlatSided { .. } => CarrierRadii { inner_mm: inner_radius_mm, outer_mm: outer_radius_mm },
             // Forces on other teeth do not depend on the carrier's radii.
-            TeethDocument::Cylinder(_) | TeethDocument::Ball(_) => CarrierRadii::default(),
+            TeethDocument::Cylinder { .. } | TeethDocument::Ball { .. } => CarrierRadii::default(),
         };
         LoadParameters {
             materials: self.materials,
@@ -238,7 +255,7 @@ impl Design {
     }
 
     /// Returns the points of the duty, or a single one without duty; none without a load.
-    pub fn duty(&self) -> Result<Duty, Fault> {
+    pub fn duty(&self) -> Result<Duty, FieldError> {
         let Some(load) = &self.load else { return Ok(Duty::default()) };
         let &LoadDocument { input_torque_nm, output_torque_nm, input_speed_rpm, .. } = load;
         let Some(duty) = &load.duty else {
@@ -248,11 +265,11 @@ impl Design {
         };
         if input_torque_nm.or(output_torque_nm).or(input_speed_rpm).is_some() {
             let detail = "`duty` has torques and speeds of its own: no other may stand here";
-            return Err(Fault::conflict("/load", detail));
+            return Err(FieldError::conflict("/load", detail));
         }
         if self.sweep.tolerance.is_some() {
             let detail = "a duty adds wear place by place, and its points have to be swept over the same input angles: give `samples`";
-            return Err(Fault::conflict("/sweep/tolerance", detail));
+            return Err(FieldError::conflict("/sweep/tolerance", detail));
         }
         let mut points = Vec::new();
         for (at, point) in duty.iter().enumerate() {
@@ -261,7 +278,7 @@ impl Design {
             points.push(DutyPoint { torque, input_speed_rpm, share_of_time });
         }
         if points.is_empty() {
-            return Err(Fault::at("/load/duty", FieldCode::OutOfRange, "a duty has one point or more"));
+            return Err(FieldError::at("/load/duty", FieldCode::OutOfRange, "a duty has one point or more"));
         }
         // All forces grow with the torque, so the point with the largest torque governs.
         let drive = self.drive_parameters();
@@ -277,7 +294,7 @@ impl Design {
 
     /// Returns every value of the duty that is out of its range, or else shares that do not add up to one. Without a
     /// duty it checks the speed of the load.
-    pub fn duty_violations(&self) -> Result<Vec<Violation>, Fault> {
+    pub fn duty_violations(&self) -> Result<Vec<Violation>, FieldError> {
         let Duty { points, is_asked, .. } = self.duty()?;
         if !is_asked {
             let speeds = points.iter().filter_map(|point| point.input_speed_rpm);
@@ -305,7 +322,7 @@ impl Design {
     }
 
     /// Returns the conflict of two fields that set the same quantity, whether or not an answer needs it.
-    pub fn conflict(&self) -> Option<Fault> {
+    pub fn conflict(&self) -> Option<FieldError> {
         let checks = [
             self.require_one_clearance(),
             self.require_one_choice_of_refinements(),
@@ -315,20 +332,20 @@ impl Design {
         checks.into_iter().filter_map(Result::err).find(|fault| fault.code == FieldCode::ConflictingFields)
     }
 
-    /// Returns the parameters of the losses, if friction is given. Fails also if a bearing has a rating and the wave
-    /// generator is no eccentric circle.
-    pub fn loss_parameters(&self) -> Result<Option<LossParameters>, Vec<Violation>> {
-        let is_eccentric = self.drive_parameters().wave_generator.is_eccentric_circle();
-        self.friction.as_ref().map(|friction| friction.loss_parameters(is_eccentric)).transpose()
+    /// Returns the parameters of the losses, if friction is given, and adds their violations:
+    /// they are valid if it adds none.
+    pub(crate) fn loss_parameters(&self, violations: &mut Vec<Violation>) -> Option<LossParameters> {
+        let is_eccentric = matches!(self.drive_parameters().wave_generator, WaveGenerator::Eccentric { .. });
+        self.friction.as_ref()?.loss_parameters(is_eccentric, violations)
     }
 
     /// Returns the input angles of the sweep. Fails if the document has both samples and a tolerance; inside is the
     /// violation of a range.
-    pub fn sweep_points(&self, max_states: u64) -> Result<Result<Points, Violation>, Fault> {
+    pub fn sweep_points(&self, max_states: u64) -> Result<Result<Points, Violation>, FieldError> {
         let SweepDocument { samples, tolerance, .. } = self.sweep;
         match (samples, tolerance) {
             (Some(_), Some(_)) => {
-                Err(Fault::conflict("/sweep", "at most one of `samples` and `tolerance` is wanted here"))
+                Err(FieldError::conflict("/sweep", "at most one of `samples` and `tolerance` is wanted here"))
             }
             (None, Some(tolerance)) => Ok(Points::tolerance(tolerance, max_states)),
             (samples, None) => {
@@ -339,22 +356,15 @@ impl Design {
         }
     }
 
-    /// Returns the requested relative error.
-    pub fn requested_error(&self) -> Result<f64, Violation> {
-        let requested_error = self.accuracy.requested_error;
-        Parameter::RequestedError.check(requested_error).map_or(Ok(requested_error), Err)
-    }
-
     /// Returns the dimensions that the mechanics do not determine. Fails if the document gives a contact two different
     /// gaps.
-    pub fn parts_parameters(&self) -> Result<PartsParameters, Fault> {
+    pub fn parts_parameters(&self) -> Result<PartsParameters, FieldError> {
         self.require_one_clearance()?;
         let PartsDocument { wave_generator, ring, carrier, teeth: _ } = &self.parts;
         let ClearancesUm { by_contact, teeth } = self.clearances_um();
         Ok(PartsParameters {
             ring_outer_radius_mm: ring.outer_radius_mm,
-            carrier_inner_radius_mm: carrier.inner_radius_mm,
-            carrier_outer_radius_mm: carrier.outer_radius_mm,
+            carrier: CarrierRadii { inner_mm: carrier.inner_radius_mm, outer_mm: carrier.outer_radius_mm },
             bore_radius_mm: wave_generator.bore_radius_mm,
             wave_generator_clearance_um: by_contact.wave_generator,
             teeth_clearance_um: teeth,
@@ -370,45 +380,24 @@ impl Design {
         Support { fingers: carrier.fingers.unwrap_or_default(), rim: ring.rim.unwrap_or_default() }
     }
 
-    /// Returns the parameters of the carrier's fingers.
-    pub fn finger_parameters(&self) -> Result<FingerParameters, Vec<Violation>> {
+    /// Returns the parameters of the carrier's fingers, and adds their violations: they are
+    /// valid if it adds none.
+    pub(crate) fn finger_parameters(&self, violations: &mut Vec<Violation>) -> FingerParameters {
         let CarrierPartDocument { fingers, finger_fillet_radius_mm: fillet_radius_mm, strength, .. } =
             self.parts.carrier;
         let strength = strength.map(StrengthDocument::numbers);
-        let mut violations: Vec<_> =
-            fillet_radius_mm.and_then(|mm| Parameter::FingerFilletRadius.check(mm)).into_iter().collect();
+        violations.extend(fillet_radius_mm.and_then(|mm| Parameter::FingerFilletRadius.check(mm)));
         if let Some(Strength { yield_mpa, tensile_mpa, endurance_mpa, .. }) = strength {
             violations.extend(Parameter::YieldStrength.check(yield_mpa));
             violations.extend(Parameter::TensileStrength.check(tensile_mpa));
             violations.extend(Parameter::EnduranceLimit.check(endurance_mpa));
         }
-        if !violations.is_empty() {
-            return Err(violations);
-        }
-        Ok(FingerParameters {
+        FingerParameters {
             fingers: fingers.unwrap_or_default(),
             fillet_radius_mm,
             strength,
             cycle: self.load.as_ref().map_or_else(LoadCycle::default, |load| load.cycle),
             friction_coefficient: self.friction.as_ref().map_or(0.0, |friction| friction.carrier.coefficient),
-        })
-    }
-
-    /// Returns the parameters of a drawing.
-    pub fn drawing_parameters(&self, max_points: u64) -> DrawingParameters {
-        DrawingParameters {
-            chord_tolerance_mm: self.profile.chord_tolerance_mm,
-            max_points,
-            input_angle_deg: self.assembly.input_angle_deg,
         }
-    }
-
-    /// Returns the parameters of the profiles.
-    pub fn profile_parameters(&self, max_points: u64) -> Result<ProfileParameters, Violation> {
-        let chord_tolerance_mm = self.profile.chord_tolerance_mm;
-        let extent = self.profile.extent;
-        Parameter::ChordTolerance
-            .check(chord_tolerance_mm)
-            .map_or(Ok(ProfileParameters { chord_tolerance_mm, extent, max_points }), Err)
     }
 }

@@ -65,8 +65,8 @@ impl Question for Drawing {
         format!("drawings/{}{preset}", word(&self.part))
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
-        let assembly = (self.part == DrawnPart::Assembly).then_some(&design.assembly);
+    fn reads(&self, design: &Design) -> impl Serialize {
+        let assembly = (self.part == DrawnPart::Assembly).then(|| design.assembly.clone());
         (design.drawn_in_key(), assembly)
     }
 
@@ -77,7 +77,11 @@ impl Question for Drawing {
         };
         let (subject, design) = (self.part, &*drawn);
         let of_design = design.drawn_in_key();
-        let parameters = design.drawing_parameters(limits.max_profile_points);
+        let parameters = solver::DrawingParameters {
+            chord_tolerance_mm: design.profile.chord_tolerance_mm,
+            max_points: limits.max_profile_points,
+            input_angle_deg: design.assembly.input_angle_deg,
+        };
         let draft = Draft::new(&design.drive_parameters())?;
         let parts = design.parts_parameters()?;
         let drawing = solver::Drawing::new(&draft, subject.subject(), &parts, &parameters);

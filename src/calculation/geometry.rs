@@ -7,7 +7,7 @@ use toothwave_solver::drawing::{self, Edge};
 use toothwave_solver::losses::{Fixed, Mechanism};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::profile::{self, Polyline, ProfileParameters};
-use toothwave_solver::{Drive, Stop};
+use toothwave_solver::{Drive, Parameter, Stop};
 use utoipa::ToSchema;
 
 use crate::design::Design;
@@ -226,21 +226,16 @@ impl Question for Geometry {
         "geometry".into()
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
-        (design.drive_in_key(), &design.profile)
+    fn reads(&self, design: &Design) -> impl Serialize {
+        (design.in_key().drive, design.profile)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer> {
         let mut violations = Vec::new();
         let drive = checked_drive(design, &mut violations)?.drive();
-        let profile = design.profile_parameters(limits.max_profile_points);
-        match (drive, profile) {
-            (Some(drive), Ok(profile)) => Ok((drive, profile)),
-            (_, profile) => {
-                violations.extend(profile.err());
-                Err(NoAnswer::impossible(&violations))
-            }
-        }
+        violations.extend(Parameter::ChordTolerance.check(design.profile.chord_tolerance_mm));
+        let drive = drive.filter(|_| violations.is_empty()).ok_or_else(|| NoAnswer::impossible(&violations))?;
+        Ok((drive, ProfileParameters { max_points: limits.max_profile_points, ..design.profile }))
     }
 
     fn max_bytes((drive, profile): &Self::Checked, format: Format) -> Option<u64> {
@@ -251,7 +246,7 @@ impl Question for Geometry {
         let profiles = profile::profiles(drive, profile, stop)?;
         let (p, cam_outer_mm) = (drive.parameters(), drive.cam_outer_radius_mm());
         let flank = drive.flank();
-        let steepest = drive.steepest_engaged()?;
+        let steepest = drive.ring_tooth().steepest_engaged()?;
         let innermost = flank.locus().at(drive.flank_limit().position)?;
         let center_distance_mm = drive.least_center_distance_mm()?;
         let tip_radius_mm = drive.tip_radius_mm();

@@ -2,19 +2,16 @@
 //!
 //! serde_json alone accepts an array for an object, keeps no place, and has no kinds of error. So the text first
 //! becomes a tree (malformed JSON fails here). The tree then feeds serde through a deserializer with the error type
-//! [`Fault`].
+//! [`FieldError`].
 
 mod deserializer;
-mod fault;
 mod tree;
 
 use serde::{Deserialize, Serialize, de};
 
-use crate::field::FieldCode;
+use crate::field::{FieldCode, FieldError};
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 
-pub use fault::{Fault, escaped};
-pub(crate) use tree::ANY;
 pub use tree::{Tree, path};
 
 /// Byte order mark of some editors. RFC 8259 allows a reader to ignore it.
@@ -57,7 +54,7 @@ pub fn tree(text: &[u8]) -> Result<Tree, NoAnswer> {
                     serde_path_to_error::Segment::Seq { index } => Some(format!("/{index}")),
                     _ => None,
                 });
-                Fault::at(&pointer.collect::<String>(), code, detail).into()
+                FieldError::at(&pointer.collect::<String>(), code, detail).into()
             }
             (_, Err(error)) => malformed(format!("{error}. Send one complete JSON document")),
             (None, Ok(_)) => malformed(error.inner().to_string()),
@@ -73,6 +70,11 @@ pub(crate) fn or_null<'de, D: de::Deserializer<'de>>(deserializer: D) -> Result<
         Tree::Null => Ok(None),
         number => number.read().map(Some).map_err(|fault| de::Error::custom(fault.detail)),
     }
+}
+
+/// Escapes a key for a JSON pointer (RFC 6901).
+pub fn escaped(key: &str) -> String {
+    key.replace('~', "~0").replace('/', "~1")
 }
 
 fn malformed(detail: impl Into<String>) -> NoAnswer {

@@ -106,11 +106,19 @@ impl std::fmt::Display for NoAnswer {
         let Self { detail, errors, .. } = self;
         f.write_str(detail)?;
         let several = if errors.len() < 2 { &[] } else { errors.as_slice() };
-        several.iter().try_for_each(|error| write!(f, "\n  {}: {}", error.pointer, error.detail))
+        several.iter().try_for_each(|error| write!(f, "\n  {error}"))
     }
 }
 
 impl std::error::Error for NoAnswer {}
+
+/// Makes the reason of a structural error: the first one in the document.
+impl From<FieldError> for NoAnswer {
+    fn from(error: FieldError) -> Self {
+        let detail = if error.pointer.is_empty() { error.detail.clone() } else { error.to_string() };
+        Self::at_fields(NoAnswerCode::InvalidDocument, detail, vec![error])
+    }
+}
 
 impl From<DriveError> for NoAnswer {
     fn from(error: DriveError) -> Self {

@@ -43,7 +43,7 @@ pub trait Question: Send + 'static {
     fn name(&self) -> String;
 
     /// Returns the parts of a normalised document that the answer depends on.
-    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a;
+    fn reads(&self, design: &Design) -> impl Serialize;
 
     /// Checks these parts and reports every impossible value.
     fn check(&self, design: &Design, limits: &Limits) -> Result<Self::Checked, NoAnswer>;
@@ -140,7 +140,7 @@ pub(crate) fn checked_load(
 fn violations_of_supports(design: &Design, draft: &Draft) -> Result<Vec<Violation>, NoAnswer> {
     let PartsDocument { ring, carrier, .. } = &design.parts;
     let is_estimated = design.model.series_compliance_mm_per_n == SeriesComplianceDocument::Estimated;
-    let has_strength = carrier.strength.is_some() && !matches!(design.drive.teeth, TeethDocument::Ball(_));
+    let has_strength = carrier.strength.is_some() && !matches!(design.drive.teeth, TeethDocument::Ball { .. });
     let has_carrier_radius = carrier.inner_radius_mm.or(carrier.outer_radius_mm).is_some();
     let asked = [
         (Part::Carrier, has_carrier_radius && (is_estimated || has_strength)),

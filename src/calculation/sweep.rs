@@ -2,12 +2,9 @@
 
 pub mod answer;
 mod arrow;
-pub mod backing;
-pub mod backlash;
 pub mod duty;
 pub mod fingers;
 pub mod losses;
-mod model_error;
 pub mod peaks_only;
 mod plots;
 mod states;
@@ -15,13 +12,15 @@ mod text;
 
 use serde::Serialize;
 use toothwave_solver::backing::Backings;
+use toothwave_solver::backlash::{self, Backlash};
 use toothwave_solver::fingers::CarrierFingers;
 use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, LossParameters, LossTotals, PointLosses};
 use toothwave_solver::losses::{Mechanism, period};
-use toothwave_solver::model_error as error_of_model;
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
-use toothwave_solver::{Contact, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings};
+use toothwave_solver::{
+    Contact, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings, model_error,
+};
 
 use crate::design::{self, Design, ModelDocument};
 use crate::field::FieldCode;
@@ -134,6 +133,21 @@ impl CheckedSweep {
         period::RadialForces::of(&self.drive, self.load(), &self.deviations, sweep, stop)
     }
 
+    /// Returns the backlash at the output.
+    pub fn backlash(&self, stop: &dyn Stop) -> Result<Backlash, SolveError> {
+        backlash::of(&self.drive, self.load(), &self.deviations, stop)
+    }
+
+    /// Returns pointers to the fields that open or close gaps.
+    pub(super) fn gap_fields(&self) -> &'static [&'static str] {
+        match (self.load().parameters().modification.is_nil(), self.deviations.is_nil()) {
+            (true, true) => &["/parts"],
+            (true, false) => &["/parts", "/deviations"],
+            (false, true) => &["/parts", "/modification"],
+            (false, false) => &["/parts", "/modification", "/deviations"],
+        }
+    }
+
     /// Solves the sweep; for a duty, that of its hardest point. Stresses are means along the teeth.
     pub fn solve(&self, stop: &dyn Stop) -> Result<solver::Sweep, SolveError> {
         self.solve_at(self.points, stop)
@@ -177,10 +191,10 @@ impl Question for Sweep {
         "sweep".into()
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
-        let Design { materials, load, friction, modification, deviations, sweep, parts, .. } = design;
-        let of_parts = (modification, deviations, parts.under_load());
-        (design.drive_in_key(), materials, load, friction, design.model_in_key(), of_parts, sweep)
+    fn reads(&self, design: &Design) -> impl Serialize {
+        let Design { drive, materials, load, friction, model, modification, deviations, sweep, parts, .. } =
+            design.in_key();
+        (drive, materials, load, friction, model, (modification, deviations, parts), sweep)
     }
 
     fn check(&self, design: &Design, limits: &Limits) -> Result<CheckedSweep, NoAnswer> {
@@ -188,18 +202,11 @@ impl Question for Sweep {
         let draft = checked_drive(design, &mut violations)?;
         // In the document's order: the first structural fault is reported.
         let load = checked_load(design, &draft, &mut violations)?;
-        let losses = design.loss_parameters().unwrap_or_else(|found| {
-            violations.extend(found);
-            None
-        });
-        violations.extend(design.finger_parameters().err().into_iter().flatten());
-        let points = design.sweep_points(limits.max_searched_states)?;
-        let (drive, load, points) = match (draft.drive(), load, points) {
-            (Some(drive), Some(load), Ok(points)) if violations.is_empty() => (drive, load, points),
-            (_, _, points) => {
-                violations.extend(points.err());
-                return Err(NoAnswer::impossible(&violations));
-            }
+        let losses = design.loss_parameters(&mut violations);
+        let finger_parameters = design.finger_parameters(&mut violations);
+        let points = design.sweep_points(limits.max_searched_states)?.map_err(|found| violations.push(found)).ok();
+        let (Some(drive), Some(load), Some(points), true) = (draft.drive(), load, points, violations.is_empty()) else {
+            return Err(NoAnswer::impossible(&violations));
         };
         let deviations = design.deviations.clone();
         let duty = design.duty()?;
@@ -218,13 +225,14 @@ impl Question for Sweep {
         let with_gaps = load.has_gaps() || !deviations.is_nil();
         let parts = design.parts_parameters()?;
         let backings = Backings::of(&drive, &draft, &parts, design.support());
-        let model = design.complete_model(error_of_model::has_pointed_tips(&drive));
-        let fingers = fingers::checked(design, &drive, &backings, &load)?;
+        let model = design.complete_model(model_error::has_pointed_tips(&drive));
+        let fingers =
+            backings.finger.map(|beam| CarrierFingers::new(&drive, beam, finger_parameters, load.parameters()));
         Ok(CheckedSweep {
             model,
             of_document: FindingAnswer::of_document(design, true),
+            fingers: fingers.transpose().map_err(SolveError::from)?,
             backings,
-            fingers,
             drive,
             duty: checked_duty(&duty, &load)?,
             is_duty: duty.is_asked,
@@ -279,7 +287,7 @@ impl Question for Sweep {
         let mut found = Vec::from_iter(findings::of_wind_up(drive, load, &sweep));
         found.extend(findings::of_half_widths(drive, load, &sweep.states, checked.load_peak_over_mean()));
         go_on()?;
-        let model_error = error_of_model::of(drive, load, deviations, &sweep, parts)?;
+        let model_error = model_error::of(drive, load, deviations, &sweep, parts)?;
         go_on()?;
         let forces = checked.radial_forces(&sweep, stop)?;
         let losses = checked.losses(&sweep, forces.as_ref(), stop)?;
@@ -297,14 +305,13 @@ impl Question for Sweep {
         }
         found.extend(findings::of_projection(drive, load)?);
         found.extend(shared.iter().flat_map(|estimates| findings::of_backing(estimates)));
-        let approaches_matter = *with_wind_up || load.has_gaps() || !deviations.is_nil();
-        found.extend(findings::of_contacts(drive, load, &peaks, approaches_matter));
+        found.extend(findings::of_contacts(drive, load, &peaks, *with_wind_up || *with_gaps));
         found.extend(finger_stress.as_ref().and_then(findings::of_fingers));
         let backlash = with_wind_up.then(|| checked.backlash(stop));
         found.extend(backlash.as_ref().and_then(findings::of_backlash));
         let causes = Causes {
             wave_generator_moves: load.parameters().wave_generator_moves,
-            fingers: backings.support().fingers,
+            fingers: backings.support.fingers,
             gap_fields: checked.gap_fields(),
             ..Causes::default()
         };

@@ -5,29 +5,25 @@ use serde_json::{Value, json};
 /// Makes an enum of kinds of object. It is written with its word always, and read as [`crate::json`] reads unions.
 #[macro_export]
 macro_rules! union {
-    (
-        $(#[$meta:meta])+
-        pub enum $union:ident by $tag:tt read $read:literal {
-            $($(#[$kind_meta:meta])+ $kind:ident($fields:ty)),+ $(,)?
-        }
-    ) => {
+    ($(#[$meta:meta])+ pub enum $union:ident by $tag:tt read $read:literal { $($kinds:tt)+ }) => {
         #[derive(Debug, Clone, PartialEq, serde::Serialize, utoipa::ToSchema)]
         #[serde(tag = $tag, rename_all = "snake_case")]
         $(#[$meta])+
         pub enum $union {
-            $($(#[$kind_meta])+ $kind($fields)),+
+            $($kinds)+
         }
 
         impl<'de> serde::Deserialize<'de> for $union {
             fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                #[derive(serde::Deserialize)]
-                #[serde(rename = $read, rename_all = "snake_case")]
+                type Union = $union;
+
+                // Deriving `ToSchema` makes `#[schema]` on fields valid here.
+                #[derive(serde::Deserialize, utoipa::ToSchema)]
+                #[serde(remote = "Union", rename = $read, rename_all = "snake_case", deny_unknown_fields)]
                 enum Read {
-                    $($kind($fields)),+
+                    $($kinds)+
                 }
-                Ok(match Read::deserialize(deserializer)? {
-                    $(Read::$kind(fields) => Self::$kind(fields)),+
-                })
+                Read::deserialize(deserializer)
             }
         }
     };

@@ -31,11 +31,12 @@ pub enum Approach {
 /// (docs/explanation/theory.md section 4.4, `corner_contact`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
-    smooth: Logarithmic,
+    /// The same contact on a smooth surface.
+    pub(crate) smooth: Logarithmic,
     /// `K`.
-    growth_mm_per_n: f64,
+    pub(crate) growth_mm_per_n: f64,
     /// `F_z`.
-    narrowing_n: f64,
+    pub(crate) narrowing_n: f64,
 }
 
 /// `ξ = F (A + B ln(F_r/F))` up to the force at which the law ends. Beyond, it continues along its tangent: no result
@@ -125,11 +126,6 @@ impl Logarithmic {
 }
 
 impl Corner {
-    /// Builds the law from that of the same contact on a smooth surface.
-    pub(crate) const fn new(smooth: Logarithmic, growth_mm_per_n: f64, narrowing_n: f64) -> Self {
-        Self { smooth, growth_mm_per_n, narrowing_n }
-    }
-
     /// Returns `ξ` and `dξ/dF`.
     fn approach(&self, force_n: f64) -> ValueAndSlope {
         let z = (self.narrowing_n / force_n).sqrt();

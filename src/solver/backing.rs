@@ -66,19 +66,6 @@ impl Backing {
             }
         }
     }
-
-    /// True if parts with this support include it.
-    const fn is_of(self, support: &Support) -> bool {
-        match self {
-            Self::CamOnBore => true,
-            Self::HousedRim => matches!(support.rim, Rim::Housed),
-            Self::FreeRim => matches!(support.rim, Rim::Free),
-            Self::FingerAtBothEnds => matches!(support.fingers, Fingers::HeldAtBothEnds),
-            Self::FingerAtOneEnd => matches!(support.fingers, Fingers::HeldAtOneEnd),
-            Self::FingerJoinedAtFarEnd => matches!(support.fingers, Fingers::FarEndsJoined),
-            Self::FingerOnWeb => matches!(support.fingers, Fingers::WebInTheMiddle),
-        }
-    }
 }
 
 /// Estimated compliance of a part behind a contact (docs/explanation/theory.md section 4.10).
@@ -194,11 +181,13 @@ impl HeldStrip {
 /// Compliant parts of a drive, as far as they can be manufactured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Backings {
-    finger: Option<FingerBeam>,
+    /// The fingers of the carrier, if it has any.
+    pub finger: Option<FingerBeam>,
     rim: Option<RimStrip>,
     housed: Option<HeldStrip>,
     cam: Option<HeldStrip>,
-    support: Support,
+    /// Support of the parts.
+    pub support: Support,
 }
 
 impl Backings {
@@ -244,16 +233,6 @@ impl Backings {
         backings
     }
 
-    /// Returns the fingers of the carrier, if it has any.
-    pub const fn finger(&self) -> Option<&FingerBeam> {
-        self.finger.as_ref()
-    }
-
-    /// Returns the support of the parts.
-    pub const fn support(&self) -> &Support {
-        &self.support
-    }
-
     /// Returns the largest load per length along a tooth over its mean, 1 without fingers.
     ///
     /// # Errors
@@ -271,26 +250,26 @@ impl Backings {
         let held = |strip: Option<HeldStrip>, contact: Contact| {
             strip.map(|strip| strip.compliance_mm_per_n(p.materials.partner(contact), counted_mm(contact)).max(0.0))
         };
-        let finger = |fingers| self.finger.map(|finger| finger.compliance_mm_per_n(&p.materials.carrier, fingers));
+        let Support { fingers, rim } = self.support;
+        let finger = |backing: Backing, support: Fingers| {
+            let compliance = self.finger.map(|finger| finger.compliance_mm_per_n(&p.materials.carrier, support));
+            (backing, fingers == support, compliance)
+        };
         let free = self.rim.map(|rim| rim.free_compliance_mm_per_n(&p.materials.ring));
         [
-            (Backing::CamOnBore, held(self.cam, Contact::WaveGenerator)),
-            (Backing::HousedRim, held(self.housed, Contact::Ring)),
-            (Backing::FreeRim, free),
-            (Backing::FingerAtBothEnds, finger(Fingers::HeldAtBothEnds)),
-            (Backing::FingerAtOneEnd, finger(Fingers::HeldAtOneEnd)),
-            (Backing::FingerJoinedAtFarEnd, finger(Fingers::FarEndsJoined)),
-            (Backing::FingerOnWeb, finger(Fingers::WebInTheMiddle)),
+            (Backing::CamOnBore, true, held(self.cam, Contact::WaveGenerator)),
+            (Backing::HousedRim, rim == Rim::Housed, held(self.housed, Contact::Ring)),
+            (Backing::FreeRim, rim == Rim::Free, free),
+            finger(Backing::FingerAtBothEnds, Fingers::HeldAtBothEnds),
+            finger(Backing::FingerAtOneEnd, Fingers::HeldAtOneEnd),
+            finger(Backing::FingerJoinedAtFarEnd, Fingers::FarEndsJoined),
+            finger(Backing::FingerOnWeb, Fingers::WebInTheMiddle),
         ]
         .into_iter()
-        // A wall of nearly zero thickness has infinite compliance.
-        .filter_map(|(backing, compliance)| Some((backing, compliance.filter(|compliance| compliance.is_finite())?)))
-        .map(|(backing, compliance_mm_per_n)| Estimate {
-            contact: backing.contact(),
-            backing,
-            compliance_mm_per_n,
-            is_as_held: backing.is_of(&self.support),
-            share: None,
+        .filter_map(|(backing, is_as_held, compliance)| {
+            // A wall of nearly zero thickness has infinite compliance.
+            let compliance_mm_per_n = compliance.filter(|compliance| compliance.is_finite())?;
+            Some(Estimate { contact: backing.contact(), backing, compliance_mm_per_n, is_as_held, share: None })
         })
         .collect()
     }

@@ -304,7 +304,7 @@ impl<'a> Flanks<'a> {
         let (d_mm, k, ratio) = (center.center_radius_mm, flank_curve.teeth_per_wave(), self.drive.teeth_per_wave());
         let ring_arm_mm = d_mm * flank.tan_pressure_angle * flank.cos_pressure_angle;
         let rad_per_mm = PerContact {
-            wave_generator: 1.0 / (center.cam_contact.lever_arm_mm * ratio),
+            wave_generator: 1.0 / (center.lever_arm_mm * ratio),
             ring: k / (ring_arm_mm * ratio),
             carrier: 1.0 / d_mm,
         };

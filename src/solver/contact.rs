@@ -211,7 +211,8 @@ impl Materials {
 /// Hertz stress of a line contact \[8\]: `σ = √(F/(π L1) · (1/ρ1 + 1/ρ2) · E*)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HertzLine {
-    modulus_per_width_mpa_per_mm: f64,
+    /// `E*/(π L1)`.
+    pub(crate) modulus_per_width_mpa_per_mm: f64,
 }
 
 impl HertzLine {
@@ -219,11 +220,6 @@ impl HertzLine {
     pub fn new(materials: &Materials, contact: Contact, tooth_width_mm: f64) -> Self {
         let modulus = materials.contact_modulus_mpa(contact);
         Self { modulus_per_width_mpa_per_mm: modulus / (PI * tooth_width_mm) }
-    }
-
-    /// Returns `E*/(π L1)`.
-    pub(crate) const fn modulus_per_width_mpa_per_mm(&self) -> f64 {
-        self.modulus_per_width_mpa_per_mm
     }
 
     /// Returns the largest pressure under `force_n`, for curvatures (convex positive) that sum to `curvature_per_mm`.

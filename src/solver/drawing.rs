@@ -12,11 +12,12 @@ use crate::contact::Part;
 use crate::drive::{Draft, Drive, DriveError};
 use crate::findings::{self, Finding};
 use crate::gaps::RAD_PER_ARCSEC;
-pub use crate::outline::{Edge, Outline, SPLINE_SHARE_OF_CHORD, Section};
+pub use crate::outline::{Edge, Outline, SPLINE_SHARE_OF_CHORD};
 use crate::outline::{POINTS_PER_CHORD, chords, ends_of_chords};
 use crate::parts::{CarrierPart, MadePart, PartsParameters};
 use crate::profile::{
     Density, Extent, ProfileParameters, SampledCurve, cam_half_lobe, cam_half_lobes, direction, expected_points,
+    on_circle,
 };
 use crate::root::NotConverged;
 use crate::spline;
@@ -48,8 +49,10 @@ pub struct Placement {
 pub struct Body {
     /// The part.
     pub part: Part,
-    /// Section of each prism.
-    pub section: Section,
+    /// Outer boundary of the section.
+    pub outer: Outline,
+    /// Holes of the section.
+    pub holes: Vec<Outline>,
     /// Placement of each prism.
     pub placements: Vec<Placement>,
 }
@@ -193,7 +196,7 @@ impl Drawing {
                 (Part::Teeth, tooth_outline(*radius_mm, *half_width_mm), Vec::new())
             }
         };
-        Ok(Body { part, section: Section { outer, holes }, placements: self.placements(part)? })
+        Ok(Body { part, outer, holes, placements: self.placements(part)? })
     }
 
     /// Returns the edges of the ring's tooth spaces, from tip to tip. Bored or rotated flanks leave lands between these.
@@ -208,7 +211,7 @@ impl Drawing {
             && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
         {
             // Both flanks end on the symmetry line, where the tip is a point or smooth.
-            *end = Point2::from(tip.radius_mm * Vector2::new(tip_rad.cos(), tip_rad.sin()));
+            *end = on_circle(tip.radius_mm, tip_rad);
         }
         let land_rad = match half.pieces.last().and_then(|piece| piece.points.last()) {
             Some(end) if tip.has_land => 2.0 * (tip_rad - end.y.atan2(end.x)),
@@ -235,10 +238,10 @@ impl Drawing {
 
     /// Returns the outline of an eccentric with its lobe along x.
     fn cam_circle(&self, set_back_mm: f64) -> Option<Outline> {
-        match self.drive.flank().locus().cam() {
+        match self.drive.flank().cam {
             Cam::Harmonic(harmonic) if harmonic.is_circle() => Some(Outline::Circle {
-                center: Point2::new(harmonic.amplitude_mm(), 0.0),
-                radius_mm: harmonic.mean_radius_mm() - set_back_mm,
+                center: Point2::new(harmonic.amplitude_mm, 0.0),
+                radius_mm: harmonic.mean_radius_mm - set_back_mm,
             }),
             _ => None,
         }
@@ -294,18 +297,17 @@ impl Drawing {
     /// lobe (docs/explanation/theory.md section 3).
     fn placements(&self, part: Part) -> Result<Vec<Placement>, SolveError> {
         let p = self.drive.parameters();
-        let input_turns = match self.subject {
-            Subject::Part(_) => 0.0,
-            Subject::Assembly => self.parameters.input_angle_deg / 360.0,
+        // A carrier that is rotated away from the flank under load is slightly ahead of its teeth.
+        let (input_turns, turned_away) = match self.subject {
+            Subject::Part(_) => (0.0, 0.0),
+            Subject::Assembly => {
+                let away_rad = self.drive.sense() * self.carrier_rotation_rad;
+                (self.parameters.input_angle_deg / 360.0, away_rad / (2.0 * PI))
+            }
         };
         let turned =
             |turns: f64| Placement { origin_mm: Point2::origin(), rotation_rad: 2.0 * PI * turns.rem_euclid(1.0) };
         let carrier_turns = input_turns / self.drive.transmission_ratio();
-        // A carrier that is rotated away from the flank under load is slightly ahead of its teeth.
-        let turned_away = match self.subject {
-            Subject::Part(_) => 0.0,
-            Subject::Assembly => self.drive.sense() * self.carrier_rotation_rad / (2.0 * PI),
-        };
         let slots = (0..p.installed).map(|slot| slot as f64 / p.installed as f64);
         Ok(match (part, self.subject) {
             (Part::Ring, _) | (Part::Teeth, Subject::Part(_)) => vec![Placement::default()],

@@ -6,7 +6,7 @@ mod tooth_counts;
 
 use neighbours::Neighbours;
 
-use crate::cam::{ToothCenter, WaveGenerator};
+use crate::cam::WaveGenerator;
 use crate::contact::PerContact;
 use crate::ring::{FlankLimit, RingFlank, RingTooth};
 use crate::root::NotConverged;
@@ -238,23 +238,9 @@ impl Drive {
         self.ring.flank.root_radius_mm()
     }
 
-    /// Returns the radius of the ring's tips before any bore.
-    pub const fn natural_tip_radius_mm(&self) -> f64 {
-        self.ring.natural_tip_radius_mm
-    }
-
     /// Returns the radius of the ring's tips: natural, trimmed by undercut, or bored.
     pub const fn tip_radius_mm(&self) -> f64 {
         self.ring.tip_radius_mm
-    }
-
-    /// Returns the engaged tooth with the largest pressure angles. It is at the steepest point of the path, or at the
-    /// end of the flank if that comes first.
-    ///
-    /// # Errors
-    /// [`NotConverged`] from the path.
-    pub fn steepest_engaged(&self) -> Result<ToothCenter, NotConverged> {
-        self.ring.steepest_engaged()
     }
 
     /// Returns the largest pressure angle β of the engaged flank.
@@ -262,11 +248,11 @@ impl Drive {
     /// # Errors
     /// [`NotConverged`] from the path.
     pub fn largest_pressure_angle_deg(&self) -> Result<f64, NotConverged> {
-        Ok((self.steepest_engaged()?.tan_pressure_angle * self.flank().teeth_per_wave()).atan().to_degrees())
+        Ok((self.ring.steepest_engaged()?.tan_pressure_angle * self.flank().teeth_per_wave()).atan().to_degrees())
     }
 
     const fn neighbours(&self) -> Neighbours {
-        Neighbours { locus: *self.ring.flank.locus(), installed: self.parameters.installed }
+        Neighbours { cam: self.ring.flank.cam, installed: self.parameters.installed }
     }
 
     /// Returns the least distance of two neighbouring centres on their path.

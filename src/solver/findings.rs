@@ -214,7 +214,7 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
     let p = drive.parameters();
     let flank = drive.flank();
     let limit = drive.flank_limit();
-    let natural_tip_radius_mm = drive.natural_tip_radius_mm();
+    let natural_tip_radius_mm = drive.ring_tooth().natural_tip_radius_mm;
     if flank.is_undercut()
         && let Some(critical_tooth_radius_mm) = flank.critical_tooth_radius_mm()
     {
@@ -230,7 +230,6 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
         }
         Some(_) | None => {}
     }
-    #[expect(clippy::cast_precision_loss, reason = "a count of teeth")]
     let least_in_mesh = Mesh::new(drive).teeth_in_mesh().min as f64;
     findings.extend(Finding::below(Code::FewTeethInMesh, least_in_mesh, 2.0));
     findings.extend(Finding::below(Code::ThinSlotWall, drive.slot_wall_mm(), thin_wall_mm(drive)));
@@ -239,10 +238,10 @@ pub fn of_drive(drive: &Drive) -> Result<Vec<Finding>, NotConverged> {
     findings.extend(Finding::below(Code::ToothBeyondCarrier, innermost_mm, cam_outer_mm));
     let outermost_mm = cam_outer_mm + p.tooth_radius_mm;
     findings.extend(Finding::above(Code::ToothBeyondCarrier, outermost_mm, drive.tip_radius_mm()));
-    let tan_pressure_angle = drive.steepest_engaged()?.tan_pressure_angle * flank.teeth_per_wave();
+    let tan_pressure_angle = drive.ring_tooth().steepest_engaged()?.tan_pressure_angle * flank.teeth_per_wave();
     let pressure_angle_deg = tan_pressure_angle.atan().to_degrees();
     findings.extend(Finding::above(Code::SteepRingFlank, pressure_angle_deg, STEEP_FLANK_DEG));
-    if let Some((amplitude_mm, limit_mm)) = flank.locus().cam().kind().hollow() {
+    if let Some((amplitude_mm, limit_mm)) = flank.locus().hollow() {
         findings.push(Finding::info(Code::HollowWaveGenerator, amplitude_mm, limit_mm));
     }
     if let ToothShape::FlatSided { flat_length_mm, .. } = p.tooth {

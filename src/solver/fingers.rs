@@ -103,7 +103,7 @@ impl CarrierFingers {
     /// let draft = Draft::new(&DriveParameters::default()).unwrap();
     /// let (drive, load) = (draft.drive().unwrap(), LoadParameters::default());
     /// let backings = Backings::of(&drive, &draft, &PartsParameters::default(), Support::default());
-    /// let beam = *backings.finger().unwrap();
+    /// let beam = backings.finger.unwrap();
     /// let fingers = CarrierFingers::new(&drive, beam, FingerParameters::default(), &load).unwrap();
     /// assert!(fingers.stress(1000.0, 280.0).stress_mpa > 0.0);
     /// ```
@@ -140,7 +140,9 @@ impl CarrierFingers {
         };
         let width_mm = drive.tooth_width_mm();
         let slot = match drive.parameters().tooth {
-            ToothShape::FlatSided { flat_length_mm, .. } => Pressure::Flat(FlatContact::new(flat_length_mm, width_mm)),
+            ToothShape::FlatSided { flat_length_mm: length_mm, .. } => {
+                Pressure::Flat(FlatContact { length_mm, width_mm })
+            }
             ToothShape::Cylinder { .. } | ToothShape::Ball { .. } => Pressure::Line {
                 hertz: HertzLine::new(&p.materials, Contact::Carrier, width_mm),
                 curvature_per_mm: 1.0 / drive.parameters().tooth_radius_mm,

@@ -98,30 +98,21 @@ impl Deviations {
         PerContact { wave_generator: self.wave_generator_runout, ring: self.ring_runout, carrier: self.carrier_runout }
     }
 
-    /// Returns the lists, each with its kind.
-    fn lists(&self) -> [(Listed, &[f64]); 6] {
-        [
-            (Listed::ToothRadius, &self.tooth_radius_um),
-            (Listed::SlotAngle, &self.slot_angle_arcsec),
-            (Listed::SlotWall, &self.slot_wall_um),
-            (Listed::RingSpace, &self.ring_space_um),
-            (Listed::RingSpaceAngle, &self.ring_space_angle_arcsec),
-            (Listed::WaveGeneratorLobe, &self.wave_generator_lobe_um),
-        ]
-    }
-
     /// Returns the values that are impossible for a drive of these parameters. Lists are checked against item counts
     /// that are valid.
     pub fn violations(&self, drive: &DriveParameters) -> Vec<Violation> {
         let mut violations = Vec::new();
-        for (listed, list) in self.lists() {
-            let (parameter, items) = match listed {
-                Listed::ToothRadius | Listed::SlotAngle | Listed::SlotWall => {
-                    (Parameter::InstalledTeeth, drive.installed)
-                }
-                Listed::RingSpace | Listed::RingSpaceAngle => (Parameter::RingTeeth, drive.ring_teeth),
-                Listed::WaveGeneratorLobe => (Parameter::Lobes, drive.wave_generator.lobes()),
-            };
+        let slots = (Parameter::InstalledTeeth, drive.installed);
+        let spaces = (Parameter::RingTeeth, drive.ring_teeth);
+        let lobes = (Parameter::Lobes, drive.wave_generator.lobes());
+        for (listed, list, (parameter, items)) in [
+            (Listed::ToothRadius, &self.tooth_radius_um, slots),
+            (Listed::SlotAngle, &self.slot_angle_arcsec, slots),
+            (Listed::SlotWall, &self.slot_wall_um, slots),
+            (Listed::RingSpace, &self.ring_space_um, spaces),
+            (Listed::RingSpaceAngle, &self.ring_space_angle_arcsec, spaces),
+            (Listed::WaveGeneratorLobe, &self.wave_generator_lobe_um, lobes),
+        ] {
             let can_be = parameter.check(items as f64).is_none();
             if let Some(items) = usize::try_from(items).ok().filter(|_| can_be)
                 && !list.is_empty()
@@ -148,15 +139,16 @@ impl Deviations {
     }
 
     fn are_of_slots(&self) -> bool {
-        any([&self.tooth_radius_um, &self.slot_angle_arcsec, &self.slot_wall_um]) || self.carrier_runout.is_any()
+        any([&self.tooth_radius_um, &self.slot_angle_arcsec, &self.slot_wall_um])
+            || self.carrier_runout.amount_um != 0.0
     }
 
     fn are_of_ring_spaces(&self) -> bool {
-        any([&self.ring_space_um, &self.ring_space_angle_arcsec]) || self.ring_runout.is_any()
+        any([&self.ring_space_um, &self.ring_space_angle_arcsec]) || self.ring_runout.amount_um != 0.0
     }
 
     fn are_of_lobes(&self) -> bool {
-        any([&self.wave_generator_lobe_um]) || self.wave_generator_runout.is_any()
+        any([&self.wave_generator_lobe_um]) || self.wave_generator_runout.amount_um != 0.0
     }
 
     /// Returns the mesh of a drive with these deviations. Its sweep has as many load periods as it takes until the same
@@ -187,12 +179,6 @@ impl Deviations {
 /// True if any entry of the lists is not zero.
 fn any<const LISTS: usize>(lists: [&[f64]; LISTS]) -> bool {
     lists.into_iter().flatten().any(|&value| value != 0.0)
-}
-
-impl Runout {
-    fn is_any(&self) -> bool {
-        self.amount_um != 0.0
-    }
 }
 
 /// Returns an entry of a list; zero beyond its end.
@@ -300,30 +286,11 @@ pub struct Gaps<'a> {
     pub(crate) clearance_mm: PerContact<f64>,
     pub(crate) modification: Modification,
     pub(crate) deviations: Option<&'a Deviations>,
-    usual: Usual,
-}
-
-/// Common displacement of teeth along the flank. A gap at its slot has the effect of a rotated wall. For items it is
-/// the median of their lists: zero if most are zero, the common value if all are equal.
-#[derive(Debug, Clone, Copy, Default)]
-struct Usual {
-    turned: Turned,
-    carrier_mm: f64,
-}
-
-impl Usual {
-    fn of(clearance_mm: &PerContact<f64>, modification: &Modification, deviations: Option<&Deviations>) -> Self {
-        let of_items = |list: fn(&Deviations) -> &[f64]| deviations.map_or(0.0, |deviations| middle(list(deviations)));
-        let walls_um = modification.slot_wall_um + of_items(|deviations| &deviations.slot_wall_um);
-        let thinner_um = modification.tooth_radius_um + of_items(|deviations| &deviations.tooth_radius_um);
-        Self {
-            turned: Turned {
-                ring_rad: RAD_PER_ARCSEC * of_items(|deviations| &deviations.ring_space_angle_arcsec),
-                carrier_rad: RAD_PER_ARCSEC * of_items(|deviations| &deviations.slot_angle_arcsec),
-            },
-            carrier_mm: clearance_mm.carrier + MM_PER_UM * (walls_um + thinner_um),
-        }
-    }
+    /// Common displacement of teeth along the flank, for items by the median of their lists: zero if most are zero, the
+    /// common value if all are equal. A gap at a slot has the effect of a rotated wall.
+    usual: Turned,
+    /// The gap at the slot of that displacement.
+    usual_carrier_mm: f64,
 }
 
 /// Rotation of flanks and walls about the axis away from the flank under load: lost motion only
@@ -362,15 +329,20 @@ impl<'a> Gaps<'a> {
     ) -> Self {
         let clearance_mm = PerContact::of(|contact| MM_PER_UM * clearance_um.get(contact));
         let deviations = deviations.filter(|deviations| !deviations.is_nil());
-        let usual = Usual::of(&clearance_mm, &modification, deviations);
-        Self { drive, clearance_mm, modification, deviations, usual }
+        let of_items = |list: fn(&Deviations) -> &[f64]| deviations.map_or(0.0, |deviations| middle(list(deviations)));
+        let walls_um = modification.slot_wall_um + of_items(|deviations| &deviations.slot_wall_um);
+        let thinner_um = modification.tooth_radius_um + of_items(|deviations| &deviations.tooth_radius_um);
+        let usual = Turned {
+            ring_rad: RAD_PER_ARCSEC * of_items(|deviations| &deviations.ring_space_angle_arcsec),
+            carrier_rad: RAD_PER_ARCSEC * of_items(|deviations| &deviations.slot_angle_arcsec),
+        };
+        let usual_carrier_mm = clearance_mm.carrier + MM_PER_UM * (walls_um + thinner_um);
+        Self { drive, clearance_mm, modification, deviations, usual, usual_carrier_mm }
     }
 
     /// True if there is no gap anywhere.
     pub fn is_nil(&self) -> bool {
-        self.deviations.is_none()
-            && self.modification.first().is_none()
-            && self.clearance_mm.iter().all(|(_, &gap_mm)| gap_mm == 0.0)
+        self.are_uniform() && self.clearance_mm.iter().all(|(_, &gap_mm)| gap_mm == 0.0)
     }
 
     /// True if the gaps are the same for every tooth and position.
@@ -414,7 +386,7 @@ impl<'a> Gaps<'a> {
     /// Returns the additional rotation at most places, gaps at slots included, for a tooth with this centre radius.
     /// Positions on the flank are relative to it.
     pub(crate) fn usually_turned(&self, center_radius_mm: f64) -> Turned {
-        self.usual.turned.and_aside(self.usual.carrier_mm, center_radius_mm)
+        self.usual.and_aside(self.usual_carrier_mm, center_radius_mm)
     }
 
     /// Returns the gaps except those from flanks and walls rotated about the axis.

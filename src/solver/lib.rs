@@ -81,7 +81,6 @@ pub mod findings;
 pub mod fingers;
 pub mod gaps;
 pub mod load_sharing;
-pub mod locus;
 pub mod losses;
 pub mod mesh;
 pub mod model_error;

@@ -19,7 +19,7 @@ use std::f64::consts::PI;
 use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::drive::{Drive, ToothShape};
-use crate::mesh::greatest_common_divisor;
+use crate::mesh::Mesh;
 use crate::ring::FlankPoint;
 
 pub use friction::{
@@ -27,45 +27,28 @@ pub use friction::{
     WaveGeneratorFriction,
 };
 
-/// Properties of a drive that the losses depend on.
+/// A drive and the mesh that lists its teeth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mechanism {
-    /// `U`: number of lobes of the wave generator.
-    pub lobes: u32,
-    /// `Z_G`: theoretical number of teeth.
-    pub teeth: u32,
-    /// `Z'_G`: number of installed teeth.
-    pub installed: u32,
-    /// `Z_K`: number of ring teeth.
-    pub ring_teeth: u32,
-    /// `r`: tooth radius.
-    pub tooth_radius_mm: f64,
+    /// The drive.
+    pub drive: Drive,
+    /// The mesh. If items deviate it lists all teeth, and no two lobes carry the same load.
+    pub mesh: Mesh,
     /// True if a tooth can spin about its own axis. A flat-sided tooth cannot.
     pub tooth_spins: bool,
-    /// `R_race`: speed of a race along the cam over its turning: `R0` of a harmonic cam and an eccentric, `(a + b)/2` of an ellipse,
-    /// `R - r` of a harmonic path.
-    pub race_radius_mm: f64,
-    /// True if items deviate. All teeth are then listed, and no two lobes carry the same load.
-    pub tells_items_apart: bool,
 }
 
 /// Tooth in mesh and its loads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadedTooth {
-    /// ψ, measured from the middle of its lobe.
-    pub position_rad: f64,
     /// Index of the lobe, counted from 0 in the direction of ψ.
     pub lobe: u32,
-    /// `d`: distance of its centre from the axis.
-    pub center_radius_mm: f64,
-    /// `tan γ`, γ the pressure angle at the wave generator.
-    pub tan_pressure_angle: f64,
-    /// `1/ρ_H`: curvature of the cam, convex positive.
-    pub cam_curvature_per_mm: f64,
-    /// `1 + rκ` of the ring's flank.
-    pub regularity: f64,
-    /// Corner of the ring's tip. A tooth touches it before it reaches the flank.
-    pub corner: Option<FlankPoint>,
+    /// Centre of the tooth and its contact with the cam.
+    pub center: ToothCenter,
+    /// Contact with the ring.
+    pub flank: FlankPoint,
+    /// True if that contact is the corner of the ring's tip, which the tooth touches before it reaches the flank.
+    pub is_at_corner: bool,
     /// `F_H`, `F_K`, `F_S` without friction.
     pub force_n: PerContact<f64>,
 }
@@ -90,7 +73,7 @@ pub struct Turning {
     pub race_mm_per_rad: f64,
     /// Power lost at each contact, summed over all teeth of all zones.
     pub work_nmm_per_rad: PerContact<f64>,
-    /// Power lost in the bearing.
+    /// `D |v_R|`: power lost in the bearing.
     pub bearing_work_nmm_per_rad: f64,
 }
 
@@ -125,12 +108,6 @@ pub struct Efficiencies<T> {
     pub ring_fixed_back_driven: T,
 }
 
-impl From<Efficiency> for Efficiencies<f64> {
-    fn from(Efficiency { driven, back_driven }: Efficiency) -> Self {
-        Self { ring_fixed: driven, ring_fixed_back_driven: back_driven }
-    }
-}
-
 impl Efficiency {
     /// True if no torque at the output turns the drive.
     pub fn is_self_locking(&self) -> bool {
@@ -141,50 +118,35 @@ impl Efficiency {
 impl Mechanism {
     /// Returns the mechanism of a drive whose items are all alike.
     pub fn of(drive: &Drive) -> Self {
-        let p = drive.parameters();
-        // The counts of a checked drive are positive and small.
-        let whole = |count: i64| u32::try_from(count).unwrap_or(u32::MAX);
-        Self {
-            lobes: drive.lobes(),
-            teeth: whole(p.teeth),
-            installed: whole(p.installed),
-            ring_teeth: whole(p.ring_teeth),
-            tooth_radius_mm: p.tooth_radius_mm,
-            tooth_spins: !matches!(p.tooth, ToothShape::FlatSided { .. }),
-            race_radius_mm: p.wave_generator.race_radius_mm(p.tooth_radius_mm),
-            tells_items_apart: false,
-        }
+        let tooth_spins = !matches!(drive.parameters().tooth, ToothShape::FlatSided { .. });
+        Self { drive: *drive, mesh: Mesh::new(drive), tooth_spins }
+    }
+
+    /// Returns `R_race`: speed of a race along the cam over its turning.
+    pub fn race_radius_mm(&self) -> f64 {
+        let p = self.drive.parameters();
+        p.wave_generator.race_radius_mm(p.tooth_radius_mm)
     }
 
     /// Returns `g = gcd(U, Z'_G)`, the number of lobes that carry the same load; 1 if items deviate.
-    pub fn lobes_loaded_alike(&self) -> u64 {
-        if self.tells_items_apart { 1 } else { greatest_common_divisor(self.lobes.into(), self.installed.into()) }
+    fn lobes_loaded_alike(&self) -> u64 {
+        if self.mesh.tells_items_apart() { 1 } else { self.mesh.lobes_loaded_alike() }
     }
 
-    /// Returns `k = Z_K/U`.
-    pub fn ring_teeth_per_wave(&self) -> f64 {
-        f64::from(self.ring_teeth) / f64::from(self.lobes)
-    }
-
-    /// Returns `s = sign(Z_G - Z_K)`.
-    pub const fn sense(&self) -> f64 {
-        if self.teeth > self.ring_teeth { 1.0 } else { -1.0 }
-    }
-
-    /// Returns the factor for sums over the listed teeth. Zones that are alike are listed only once.
-    pub fn zones_in_torque(&self) -> f64 {
-        let is_one_zone = !self.tells_items_apart && self.installed.is_multiple_of(self.lobes);
-        if is_one_zone { f64::from(self.lobes) } else { 1.0 }
+    /// Returns `Z_G`, `Z_K` and `U`.
+    fn counts(&self) -> [f64; 3] {
+        let p = self.drive.parameters();
+        [p.teeth as f64, p.ring_teeth as f64, f64::from(self.drive.lobes())]
     }
 
     /// Returns the speed ratio of driving to driven member, both relative to the fixed one: `s Z_G/U`, `-s Z_K/U`,
     /// `Z_G/Z_K`. Without losses it is also the ratio of output to input torque.
     pub fn speed_ratio(&self, fixed: Fixed) -> f64 {
-        let over = |one: u32, other: u32| f64::from(one) / f64::from(other);
+        let [teeth, ring_teeth, _] = self.counts();
         match fixed {
-            Fixed::Ring => self.sense() * over(self.teeth, self.lobes),
-            Fixed::Carrier => -self.sense() * over(self.ring_teeth, self.lobes),
-            Fixed::WaveGenerator => over(self.teeth, self.ring_teeth),
+            Fixed::Ring => self.drive.transmission_ratio(),
+            Fixed::Carrier => self.drive.transmission_ratio_carrier_fixed(),
+            Fixed::WaveGenerator => teeth / ring_teeth,
         }
     }
 
@@ -192,23 +154,24 @@ impl Mechanism {
     /// input.
     pub fn holding_torque_ratio(&self, fixed: Fixed) -> f64 {
         // Whole numbers of teeth avoid cancellation.
-        let over = |one: u32, other: u32| f64::from(one) / f64::from(other);
+        let ([teeth, ring_teeth, lobes], s) = (self.counts(), self.drive.sense());
         match fixed {
-            Fixed::Ring => self.sense() * over(self.ring_teeth, self.lobes),
-            Fixed::Carrier => -self.sense() * over(self.teeth, self.lobes),
-            Fixed::WaveGenerator => self.sense() * over(self.lobes, self.ring_teeth),
+            Fixed::Ring => s * (ring_teeth / lobes),
+            Fixed::Carrier => -s * (teeth / lobes),
+            Fixed::WaveGenerator => s * (lobes / ring_teeth),
         }
     }
 
     /// Returns the loss divided by the power at the driven end, `ℓ`, from the loss ratio ν: `ν Z_K/Z_G`, `ν`, `ν
     /// U/Z_G`.
     pub fn loss_share(&self, fixed: Fixed, loss_ratio: f64) -> f64 {
+        let [teeth, ring_teeth, lobes] = self.counts();
         let turns = match fixed {
-            Fixed::Ring => self.ring_teeth,
-            Fixed::Carrier => self.teeth,
-            Fixed::WaveGenerator => self.lobes,
+            Fixed::Ring => ring_teeth,
+            Fixed::Carrier => teeth,
+            Fixed::WaveGenerator => lobes,
         };
-        loss_ratio * (f64::from(turns) / f64::from(self.teeth))
+        loss_ratio * (turns / teeth)
     }
 
     /// Returns the efficiencies `1/(1 + ℓ)` and `1 - ℓ` at a loss ratio ν. Over a period, use the mean ν.
@@ -219,19 +182,21 @@ impl Mechanism {
 
     /// Returns `|ω_HS|`, the speed of the wave generator relative to the carrier with the ring fixed: `|ω_H| Z_K/Z_G`.
     pub fn turning_rad_per_s(&self, input_speed_rpm: f64) -> f64 {
-        input_speed_rpm * (2.0 * PI / 60.0) * (f64::from(self.ring_teeth) / f64::from(self.teeth))
+        let [teeth, ring_teeth, _] = self.counts();
+        input_speed_rpm * (2.0 * PI / 60.0) * (ring_teeth / teeth)
     }
 
     /// Returns the slips of a tooth that does not spin: `a_H = d/cos γ - r`, `a_K = s(d/cos β + r)/k`, at a corner `s(d
     /// tan γ sin β + (d cos β + ℓ)/k)`, and `a_S = -s d tan β/k`.
     fn slip_without_spin_mm_per_rad(&self, tooth: &LoadedTooth) -> PerContact<f64> {
-        let (k, s, r) = (self.ring_teeth_per_wave(), self.sense(), self.tooth_radius_mm);
-        let (d, t) = (tooth.center_radius_mm, tooth.tan_pressure_angle);
-        let on_ring = match tooth.corner {
-            None => (d * secant(k * t) + r) / k,
-            Some(FlankPoint { distance_mm, tan_pressure_angle, cos_pressure_angle: cos, .. }) => {
-                d * t * tan_pressure_angle * cos + (d * cos + distance_mm) / k
-            }
+        let drive = &self.drive;
+        let (k, s, r) = (drive.flank().teeth_per_wave(), drive.sense(), drive.parameters().tooth_radius_mm);
+        let (d, t) = (tooth.center.center_radius_mm, tooth.center.tan_pressure_angle);
+        let FlankPoint { distance_mm, tan_pressure_angle, cos_pressure_angle: cos, .. } = tooth.flank;
+        let on_ring = if tooth.is_at_corner {
+            d * t * tan_pressure_angle * cos + (d * cos + distance_mm) / k
+        } else {
+            (d * secant(k * t) + r) / k
         };
         PerContact {
             wave_generator: d * secant(t) - r,
@@ -246,7 +211,7 @@ impl Mechanism {
     pub fn turning(&self, friction: &Friction, teeth: &[LoadedTooth]) -> Turning {
         let slips: Vec<_> = teeth.iter().map(|tooth| self.slip_without_spin_mm_per_rad(tooth)).collect();
         let race_mm_per_rad = self.race_mm_per_rad(friction, teeth, &slips);
-        let zones = self.zones_in_torque();
+        let zones = self.mesh.zones_in_torque();
         let (mut work, mut load_n) = (PerContact::default(), 0.0);
         let mut slipping = Vec::with_capacity(teeth.len());
         for (tooth, slip) in teeth.iter().zip(&slips) {
@@ -262,7 +227,9 @@ impl Mechanism {
             teeth: slipping,
             race_mm_per_rad,
             work_nmm_per_rad: work,
-            bearing_work_nmm_per_rad: self.bearing_work_nmm_per_rad(friction, load_n, race_mm_per_rad),
+            bearing_work_nmm_per_rad: friction
+                .bearing()
+                .map_or(0.0, |bearing| bearing.drag_n(load_n, self.race_radius_mm()) * race_mm_per_rad.abs()),
         }
     }
 
@@ -280,23 +247,17 @@ impl Mechanism {
         ToothSlip { slip_mm_per_rad: PerContact::of(|contact| slip.get(contact) - spin_mm_per_rad), rolls }
     }
 
-    /// Returns `D |v_R|`, the bearing's loss under the forces of all teeth.
-    fn bearing_work_nmm_per_rad(&self, friction: &Friction, load_n: f64, race_mm_per_rad: f64) -> f64 {
-        let drag_n = |bearing: RaceBearing| bearing.drag_n(load_n, self.race_radius_mm);
-        friction.bearing().map_or(0.0, |bearing| drag_n(bearing) * race_mm_per_rad.abs())
-    }
-
     /// Returns `v_R`, the race speed that minimizes the loss `Σ min_ω Σ μ_c F_c |v_c| + D |v_R|`. Each tooth's part is
     /// convex and piecewise linear. Its slope changes where its contact with the race would roll together with another
     /// contact, at `a_H - a_K` and `a_H - a_S`. The minimum is therefore at a weighted median of these points and of 0.
     fn race_mm_per_rad(&self, friction: &Friction, teeth: &[LoadedTooth], slips: &[PerContact<f64>]) -> f64 {
         let bearing = match friction.0.wave_generator {
             WaveGeneratorFriction::Plain { .. } => return 0.0,
-            WaveGeneratorFriction::Rolling { .. } => return self.race_radius_mm,
+            WaveGeneratorFriction::Rolling { .. } => return self.race_radius_mm(),
             WaveGeneratorFriction::Race { bearing, .. } => bearing,
         };
         let load_n: f64 = teeth.iter().map(|tooth| tooth.force_n.wave_generator).sum();
-        let drag = Weighted { place: 0.0, weight: bearing.drag_n(load_n, self.race_radius_mm), of: () };
+        let drag = Weighted { place: 0.0, weight: bearing.drag_n(load_n, self.race_radius_mm()), of: () };
         let of_teeth = teeth.iter().zip(slips).flat_map(|(tooth, slip)| {
             let limit_n = friction.limit_n(&tooth.force_n);
             let with = |other: f64, weight: f64| Weighted { place: slip.wave_generator - other, weight, of: () };
@@ -311,22 +272,6 @@ impl Mechanism {
         });
         let mut places: Vec<_> = of_teeth.chain(std::iter::once(drag)).collect();
         weighted_median(&mut places).map_or(0.0, |median| median.place)
-    }
-}
-
-impl LoadedTooth {
-    /// Returns a tooth at its position under these forces.
-    pub const fn new(lobe: u32, center: &ToothCenter, flank: &FlankPoint, force_n: PerContact<f64>) -> Self {
-        Self {
-            position_rad: center.position.from_lobe_rad,
-            lobe,
-            center_radius_mm: center.center_radius_mm,
-            tan_pressure_angle: center.tan_pressure_angle,
-            cam_curvature_per_mm: center.cam_contact.curvature_per_mm,
-            regularity: flank.regularity,
-            corner: None,
-            force_n,
-        }
     }
 }
 

@@ -105,7 +105,7 @@ impl Mesh {
 
     /// Returns the mesh with the teeth before the flank listed too, up to the valley, as at a regular tip.
     pub(crate) fn with_teeth_before_flank(self) -> Self {
-        Self { listed_spacings: 0.5 * self.installed as f64 / self.teeth_at_each_place(), ..self }
+        Self { listed_spacings: 0.5 * self.installed as f64 / self.lobes_loaded_alike() as f64, ..self }
     }
 
     pub(crate) fn lists_teeth_before_flank(&self) -> bool {
@@ -136,7 +136,7 @@ impl Mesh {
         u64::from(self.lobes)
     }
 
-    /// Returns `g = gcd(U, Z'_G)`: the number of teeth at the same position, each on its own lobe.
+    /// Returns `g = gcd(U, Z'_G)`: the number of teeth at each place, each on its own lobe.
     pub fn lobes_loaded_alike(&self) -> u64 {
         greatest_common_divisor(self.lobes(), self.installed)
     }
@@ -156,14 +156,9 @@ impl Mesh {
         if self.zones_are_alike() { 1 } else { self.lobes_loaded_alike() }
     }
 
-    /// Returns the number of teeth at each place, which is the factor for a sum over one tooth at each place.
-    pub(crate) fn teeth_at_each_place(&self) -> f64 {
-        self.lobes_loaded_alike() as f64
-    }
-
     /// Returns the contact ratio (the paper's coincidence degree) `ε = U ψ_e Z'_G/2π`, counted over all zones.
     pub fn coincidence_degree(&self) -> f64 {
-        self.teeth_at_each_place() * self.engaged_spacings
+        self.lobes_loaded_alike() as f64 * self.engaged_spacings
     }
 
     /// Returns the load period: the input angle after which the load pattern repeats, teeth renumbered, `2π m/Z_K` with
@@ -377,7 +372,7 @@ impl Mesh {
     pub fn position_between(&self, place: u64, fraction: f64) -> Position {
         let spacing_rad = 2.0 * PI / self.places() as f64;
         let from_lobe_rad = (place as f64 - fraction) * spacing_rad;
-        let to_valley = 0.5 * self.installed as f64 / self.teeth_at_each_place();
+        let to_valley = 0.5 * self.installed as f64 / self.lobes_loaded_alike() as f64;
         let from_valley_rad = ((to_valley - place as f64) + fraction) * spacing_rad;
         if from_lobe_rad < from_valley_rad {
             Position::from_lobe(from_lobe_rad, self.lobes)

@@ -29,23 +29,13 @@ pub const GAP_TO_UM: f64 = 10.0;
 /// Largest gap divided by the tooth's radius: 10 µm at teeth of 1.5 mm.
 pub const GAP_SHARE_TO: f64 = 0.01 / 1.5;
 
-/// Largest wind-up times the number of lobes, and divided by the period, for natural tips with a gap. Lever arms and
+/// Largest wind-up times the number of lobes, in rad, and divided by the period, for natural tips with a gap. Lever arms and
 /// tooth positions are unloaded or exact to second order, which was verified up to here. Without gaps all teeth move
 /// alike, and it matters less.
-const WIND_UP_TO: WindUpTo = WindUpTo { times_lobes_rad: 0.02, share_of_period: 0.05 };
+const WIND_UP_TO: [f64; 2] = [0.02, 0.05];
 
 /// The same for pointed and bored tips.
-const WIND_UP_AT_POINTED_TIPS_TO: WindUpTo = WindUpTo { times_lobes_rad: 0.031, share_of_period: 0.095 };
-
-/// Limits for drives without gaps: the wind-up at which the finding is reported.
-const WITHOUT_GAPS_TO: WindUpTo =
-    WindUpTo { times_lobes_rad: WIND_UP_TIMES_LOBES_RAD, share_of_period: WIND_UP_SHARE_OF_PERIOD };
-
-#[derive(Debug, Clone, Copy)]
-struct WindUpTo {
-    times_lobes_rad: f64,
-    share_of_period: f64,
-}
+const WIND_UP_AT_POINTED_TIPS_TO: [f64; 2] = [0.031, 0.095];
 
 /// Largest half width of a contact over all states, divided by the tooth's radius. All calculated drives are below it.
 pub const HALF_WIDTH_SHARE_TO: f64 = 0.035;
@@ -67,11 +57,6 @@ pub struct ErrorRange {
 impl ErrorRange {
     const fn percent([low, high]: [i32; 2]) -> Self {
         Self { low: low as f64 / 100.0, high: high as f64 / 100.0 }
-    }
-
-    /// True if an error lies within the range.
-    pub fn contains(&self, error: f64) -> bool {
-        (self.low..=self.high).contains(&error)
     }
 
     /// Returns the larger absolute value of the two errors.
@@ -244,12 +229,13 @@ pub struct MeasuredRange {
 impl MeasuredRange {
     fn of(drive: &Drive, law: &ContactLaw, case: Case) -> Self {
         let tooth_radius_mm = drive.parameters().tooth_radius_mm;
-        let to = match (case.has_gaps, case.has_pointed_tips) {
-            (false, _) => WITHOUT_GAPS_TO,
+        let [times_lobes_rad, share_of_period] = match (case.has_gaps, case.has_pointed_tips) {
+            // The wind-up at which the finding is reported.
+            (false, _) => [WIND_UP_TIMES_LOBES_RAD, WIND_UP_SHARE_OF_PERIOD],
             (true, false) => WIND_UP_TO,
             (true, true) => WIND_UP_AT_POINTED_TIPS_TO,
         };
-        let by_lobes_deg = (to.times_lobes_rad / f64::from(drive.lobes())).to_degrees();
+        let by_lobes_deg = (times_lobes_rad / f64::from(drive.lobes())).to_degrees();
         // The law's own limit may be lower.
         let of_law = law.reference_length_mm(tooth_radius_mm).map_or(f64::INFINITY, |length_mm| {
             length_mm
@@ -260,7 +246,7 @@ impl MeasuredRange {
             lobes: LOBES_TO,
             pressure_angle_deg: PRESSURE_ANGLE_TO_DEG,
             gap_um: GAP_TO_UM.min(1e3 * GAP_SHARE_TO * tooth_radius_mm),
-            wind_up_deg: by_lobes_deg.min(to.share_of_period * Mesh::new(drive).period_deg()),
+            wind_up_deg: by_lobes_deg.min(share_of_period * Mesh::new(drive).period_deg()),
             half_width_over_tooth_radius: HALF_WIDTH_SHARE_TO.min(of_law),
         }
     }

@@ -131,15 +131,6 @@ impl Outline {
     }
 }
 
-/// Face: an outline with holes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Section {
-    /// Outer boundary.
-    pub outer: Outline,
-    /// Holes.
-    pub holes: Vec<Outline>,
-}
-
 /// Returns the number of chords of a curve with [`POINTS_PER_CHORD`].
 pub(crate) const fn chords(points: &Polyline) -> usize {
     (points.len() - 1) / POINTS_PER_CHORD as usize

@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 use crate::contact::Part;
 use crate::drive::{Draft, Drive, DriveError};
 use crate::gaps::{MM_PER_UM, Modification};
+use crate::ring::RingTooth;
 use crate::tooth_space::ToothSpace;
 use crate::violation::{FieldCode as Code, Modified, Parameter, Violation};
 
@@ -18,10 +19,8 @@ use crate::violation::{FieldCode as Code, Modified, Parameter, Violation};
 pub struct PartsParameters {
     /// Outer radius of the ring; by default [`RIM`] times the largest radius of its tooth spaces.
     pub ring_outer_radius_mm: Option<f64>,
-    /// Radius of the carrier's bore, inside which the cam turns; by default [`CARRIER_PLAY`] outside the cam.
-    pub carrier_inner_radius_mm: Option<f64>,
-    /// Outer radius of the carrier; by default [`CARRIER_PLAY`] inside the ring's tips.
-    pub carrier_outer_radius_mm: Option<f64>,
+    /// Radii of the carrier.
+    pub carrier: CarrierRadii,
     /// Radius of the wave generator's bore; it has none by default.
     pub bore_radius_mm: Option<f64>,
     /// Set-back of the cam along its normal.
@@ -39,7 +38,7 @@ pub struct PartsParameters {
 /// Radii between which the carrier has its slots, if given.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CarrierRadii {
-    /// Radius of the carrier's bore; by default [`CARRIER_PLAY`] outside the cam.
+    /// Radius of the carrier's bore, inside which the cam turns; by default [`CARRIER_PLAY`] outside the cam.
     pub inner_mm: Option<f64>,
     /// Outer radius of the carrier; by default [`CARRIER_PLAY`] inside the ring's tips.
     pub outer_mm: Option<f64>,
@@ -48,30 +47,21 @@ pub struct CarrierRadii {
 impl CarrierRadii {
     /// Returns both radii, with defaults for those not given.
     pub(crate) fn of(self, drive: &Drive) -> [f64; 2] {
-        let [inner_mm, outer_mm] = Annulus::of(drive).carrier_mm();
+        let [inner_mm, outer_mm] = default_carrier_mm(drive.cam_outer_radius_mm(), drive.tip_radius_mm());
         [self.inner_mm.unwrap_or(inner_mm), self.outer_mm.unwrap_or(outer_mm)]
     }
 
-    /// Returns violations if no carrier with these radii fits a cam that is set forward by this amount. It checks as
-    /// far as the drive is possible, and nothing if no radius is given.
-    pub(crate) fn violations(self, draft: &Draft, set_forward_um: f64) -> Vec<Violation> {
-        self.violations_between(draft.cam_outer_mm, Annulus::of_draft(draft), set_forward_um)
-    }
-
-    /// Returns the same violations for a possible drive.
-    pub(crate) fn violations_in(self, drive: &Drive, set_forward_um: f64) -> Vec<Violation> {
-        self.violations_between(Some(drive.cam_outer_radius_mm()), Some(Annulus::of(drive)), set_forward_um)
-    }
-
-    fn violations_between(
+    /// Returns violations if no carrier with these radii fits between a cam that is set forward by this amount and a
+    /// ring. It checks as far as cam and ring are known, and nothing if no radius is given.
+    pub(crate) fn violations(
         self,
         cam_outer_mm: Option<f64>,
-        annulus: Option<Annulus>,
+        ring: Option<&RingTooth>,
         set_forward_um: f64,
     ) -> Vec<Violation> {
         let mut checks = Checks(Vec::new());
         if self != Self::default() {
-            checks.carrier_radii(self, cam_outer_mm, annulus, set_forward_um, f64::INFINITY);
+            checks.carrier_radii(self, cam_outer_mm, ring, set_forward_um, f64::INFINITY);
         }
         checks.0
     }
@@ -104,11 +94,6 @@ impl PartsParameters {
             Part::WaveGenerator => self.check_wave_generator(draft, &mut checks),
         }
         checks.0
-    }
-
-    /// Returns the carrier's radii.
-    const fn carrier_radii(&self) -> CarrierRadii {
-        CarrierRadii { inner_mm: self.carrier_inner_radius_mm, outer_mm: self.carrier_outer_radius_mm }
     }
 
     fn check_ring(&self, draft: &Draft, checks: &mut Checks) {
@@ -168,9 +153,9 @@ impl PartsParameters {
     fn check_carrier(&self, draft: &Draft, checks: &mut Checks) {
         let clearance_mm = checks.clearance_mm(Part::Carrier, self.carrier_clearance_um);
         let set_forward_um = -self.modification.wave_generator_equidistant_um - self.wave_generator_clearance_um;
-        let annulus = Annulus::of_draft(draft);
         let tip_mm = self.ring_space(draft).map_or(f64::INFINITY, |space| space.tip().radius_mm);
-        let outer_mm = checks.carrier_radii(self.carrier_radii(), draft.cam_outer_mm, annulus, set_forward_um, tip_mm);
+        let ring = draft.ring.as_ref();
+        let outer_mm = checks.carrier_radii(self.carrier, draft.cam_outer_mm, ring, set_forward_um, tip_mm);
         if let (Some(clearance_mm), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
             let (value, least_um) = (self.modification.slot_wall_um, -(half_width_mm + clearance_mm) / MM_PER_UM);
             checks.modification(value > least_um, Modified::SlotWall, value, least_um);
@@ -218,31 +203,10 @@ impl PartsParameters {
     }
 }
 
-/// Annulus for the carrier between cam and ring tips.
-#[derive(Debug, Clone, Copy)]
-struct Annulus {
-    inner_mm: f64,
-    outer_mm: f64,
-}
-
-impl Annulus {
-    /// Returns the annulus of a drive, which always has one.
-    fn of(drive: &Drive) -> Self {
-        Self { inner_mm: drive.cam_outer_radius_mm(), outer_mm: drive.tip_radius_mm() }
-    }
-
-    /// Returns the annulus as far as the drive is possible.
-    fn of_draft(draft: &Draft) -> Option<Self> {
-        let ring = draft.ring?;
-        let annulus = Self { inner_mm: ring.flank.locus().cam_outer_radius_mm(), outer_mm: ring.tip_radius_mm };
-        (annulus.inner_mm < annulus.outer_mm).then_some(annulus)
-    }
-
-    /// Returns the carrier's default radii.
-    fn carrier_mm(&self) -> [f64; 2] {
-        let play_mm = CARRIER_PLAY * (self.outer_mm - self.inner_mm);
-        [self.inner_mm + play_mm, self.outer_mm - play_mm]
-    }
+/// Returns the carrier's default radii between the largest radius of the cam and the ring's tips.
+fn default_carrier_mm(cam_outer_mm: f64, tip_mm: f64) -> [f64; 2] {
+    let play_mm = CARRIER_PLAY * (tip_mm - cam_outer_mm);
+    [cam_outer_mm + play_mm, tip_mm - play_mm]
 }
 
 /// Manufactured part of [`PartsParameters`] that have no violation for the drive.
@@ -297,7 +261,7 @@ pub(crate) struct CarrierPart {
 
 impl CarrierPart {
     pub(crate) fn new(drive: &Drive, parameters: &PartsParameters) -> Self {
-        let [inner_radius_mm, outer_radius_mm] = parameters.carrier_radii().of(drive);
+        let [inner_radius_mm, outer_radius_mm] = parameters.carrier.of(drive);
         Self {
             inner_radius_mm,
             outer_radius_mm,
@@ -308,11 +272,13 @@ impl CarrierPart {
 
     /// Returns the carrier without clearance or play, if its slots leave one.
     pub(crate) fn widest(drive: &Drive) -> Option<Self> {
-        let Annulus { inner_mm, outer_mm } = Annulus::of(drive);
-        let slot_half_width_mm = drive.slot_half_width_mm();
-        let slots_meet_mm = slot_half_width_mm / (PI / drive.parameters().installed as f64).sin();
-        let carrier = Self { inner_radius_mm: inner_mm, outer_radius_mm: outer_mm, slot_half_width_mm };
-        (slots_meet_mm < outer_mm).then_some(carrier)
+        let carrier = Self {
+            inner_radius_mm: drive.cam_outer_radius_mm(),
+            outer_radius_mm: drive.tip_radius_mm(),
+            slot_half_width_mm: drive.slot_half_width_mm(),
+        };
+        let slots_meet_mm = carrier.slot_half_width_mm / (PI / drive.parameters().installed as f64).sin();
+        (slots_meet_mm < carrier.outer_radius_mm).then_some(carrier)
     }
 }
 
@@ -341,11 +307,14 @@ impl Checks {
         &mut self,
         radii: CarrierRadii,
         cam_outer_mm: Option<f64>,
-        annulus: Option<Annulus>,
+        ring: Option<&RingTooth>,
         set_forward_um: f64,
         made_tip_mm: f64,
     ) -> Option<f64> {
-        let [inner_mm, outer_mm] = annulus.map_or([None; 2], |annulus| annulus.carrier_mm().map(Some));
+        let annulus_mm = ring.map(|ring| (ring.flank.locus().cam_outer_radius_mm(), ring.tip_radius_mm));
+        let annulus_mm = annulus_mm.filter(|(cam_outer_mm, tip_mm)| cam_outer_mm < tip_mm);
+        let default_mm = annulus_mm.map(|(cam_outer_mm, tip_mm)| default_carrier_mm(cam_outer_mm, tip_mm));
+        let [inner_mm, outer_mm] = default_mm.map_or([None; 2], |radii_mm| radii_mm.map(Some));
         let inner_mm = self.radius_mm(Parameter::CarrierInnerRadius, radii.inner_mm, inner_mm);
         let outer_mm = self.radius_mm(Parameter::CarrierOuterRadius, radii.outer_mm, outer_mm);
         if let (Some(inner_mm), Some(a)) = (inner_mm, cam_outer_mm) {
@@ -357,8 +326,8 @@ impl Checks {
             });
         }
         if let Some(outer_mm) = outer_mm {
-            if let Some(annulus) = annulus {
-                let limit_mm = annulus.outer_mm.min(made_tip_mm);
+            if let Some((_, tip_mm)) = annulus_mm {
+                let limit_mm = tip_mm.min(made_tip_mm);
                 self.below(Code::CarrierMeetsRing, Parameter::CarrierOuterRadius, outer_mm, limit_mm, |value, limit| {
                     format!(
                         "a carrier of {value:?} mm outer radius meets the ring: choose less than the ring's tip radius of {limit:?} mm"

@@ -73,11 +73,6 @@ impl Position {
         Self::between(from_lobe_rad, from_valley_rad, lobes)
     }
 
-    /// Returns `π/U`.
-    pub fn half_lobe_rad(&self) -> f64 {
-        half_lobe_rad(self.lobes)
-    }
-
     /// Returns ψ in degrees.
     pub fn from_lobe_deg(&self) -> f64 {
         if self.from_valley_rad < self.from_lobe_rad {

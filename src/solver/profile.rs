@@ -4,11 +4,10 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point2, Rotation2, Unit, Vector2};
 
-use crate::cam::CurvePoint;
+use crate::cam::{CurvePoint, Kind};
 use crate::drive::Drive;
-use crate::locus::Locus;
-use crate::position::Position;
-use crate::ring::{FlankEnd, FlankLimit, RingFlank};
+use crate::position::{Position, half_lobe_rad};
+use crate::ring::{FlankEnd, RingFlank};
 use crate::root::NotConverged;
 use crate::{SolveError, Stop};
 
@@ -27,14 +26,17 @@ pub enum Extent {
     Full,
 }
 
-/// Parameters of the profiles.
+/// The sampling of profiles.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(deny_unknown_fields, default, expecting = "an object"), schema(as = ProfileDocument))]
 pub struct ProfileParameters {
-    /// Largest distance of a chord from its curve, in mm.
+    /// Largest distance of a chord from its curve, in mm. Default: 0.001 mm.
     pub chord_tolerance_mm: f64,
-    /// Extent of the ring.
+    /// Part of the ring to draw: one tooth or the full ring. Default: one tooth.
     pub extent: Extent,
     /// Largest number of points over all profiles.
+    #[cfg_attr(feature = "document", serde(skip))]
     pub max_points: u64,
 }
 
@@ -67,13 +69,6 @@ pub(crate) struct Density {
     pub(crate) max_chords: u64,
 }
 
-impl Density {
-    /// Returns the density of the chords' ends only.
-    const fn of_chords(parameters: &ProfileParameters) -> Self {
-        Self { tolerance_mm: parameters.chord_tolerance_mm, points_per_chord: 1, max_chords: parameters.max_points }
-    }
-}
-
 /// A sampled curve with its direction at each point.
 pub(crate) struct SampledCurve {
     pub(crate) points: Polyline,
@@ -102,23 +97,24 @@ const MAX_DEPTH: u32 = 40;
 /// [`SolveError::TooManyPoints`], [`SolveError::Stopped`], and [`SolveError::NotConverged`] from the geometry.
 pub fn profiles(drive: &Drive, parameters: &ProfileParameters, stop: &dyn Stop) -> Result<Profiles, SolveError> {
     let ring_teeth = drive.parameters().ring_teeth.unsigned_abs();
-    let density = Density::of_chords(parameters);
+    let &ProfileParameters { chord_tolerance_mm: tolerance_mm, extent, max_points } = parameters;
+    let density = Density { tolerance_mm, points_per_chord: 1, max_chords: max_points };
     let flank = ring_half_tooth(drive, density, stop)?;
     let path = path_half_tooth(drive, density, stop)?;
     let half_lobe = cam_half_lobe(drive.flank().locus(), 0.0, density, stop)?.points;
 
-    let copies = match parameters.extent {
+    let copies = match extent {
         Extent::Tooth => 1,
         Extent::Full => ring_teeth,
     };
     let spans = |half: &Polyline| 2 * (half.len() as u64 - 1);
     let points = copies * (spans(&flank) + spans(&path)) + u64::from(drive.lobes()) * spans(&half_lobe) + 3;
-    if points > parameters.max_points {
-        return Err(SolveError::TooManyPoints { points, limit: parameters.max_points });
+    if points > max_points {
+        return Err(SolveError::TooManyPoints { points, limit: max_points });
     }
     Ok(Profiles {
-        ring: repeated(&from_tip_to_tip(&flank), ring_teeth, parameters.extent),
-        tooth_center_path: repeated(&from_tip_to_tip(&path), ring_teeth, parameters.extent),
+        ring: repeated(&from_tip_to_tip(&flank), ring_teeth, extent),
+        tooth_center_path: repeated(&from_tip_to_tip(&path), ring_teeth, extent),
         wave_generator: closed(&cam_outline(&half_lobe, drive.lobes())),
     })
 }
@@ -150,7 +146,7 @@ pub fn expected_points(drive: &Drive, parameters: &ProfileParameters) -> u64 {
 
 /// Returns the ring from the middle of its tooth space to its tooth's symmetry line, including the land of a bored tip.
 fn ring_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
-    let mut points = flank_curve(drive.flank(), drive.flank_limit(), density, stop)?.points;
+    let mut points = flank_curve(drive.flank(), drive.flank_limit().position, density, stop)?.points;
     let tip_rad = PI / drive.parameters().ring_teeth as f64;
     match drive.flank_limit().end {
         FlankEnd::RegularTip | FlankEnd::Undercut => {
@@ -174,15 +170,15 @@ fn ring_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<P
     Ok(points)
 }
 
-/// Returns the ring's flank from the middle of its tooth space to its end.
+/// Returns the ring's flank from the middle of its tooth space to a position.
 pub(crate) fn flank_curve(
     flank: &RingFlank,
-    limit: &FlankLimit,
+    end: Position,
     density: Density,
     stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = flank.locus().lobes();
-    sampled(Position::lobe(lobes), limit.position, density, stop, |position| {
+    sampled(Position::lobe(lobes), end, density, stop, |position| {
         let tooth = flank.locus().at(position)?;
         let point = flank.at(&tooth);
         Ok(CurvePoint {
@@ -195,21 +191,10 @@ pub(crate) fn flank_curve(
 
 /// Returns the path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
 fn path_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
-    let flank = drive.flank();
-    let lobes = drive.lobes();
-    let mut points = sampled(Position::lobe(lobes), Position::valley(lobes), density, stop, |position| {
-        let tooth = flank.locus().at(position)?;
-        let point = flank.at(&tooth);
-        let angle_rad = position.from_lobe_rad / flank.teeth_per_wave();
-        Ok(CurvePoint {
-            point: on_circle(tooth.center_radius_mm, angle_rad),
-            tangent: flank.tangent(&tooth, &point),
-            bend: flank.turning(&tooth),
-        })
-    })?
-    .points;
+    let (flank, p) = (drive.flank(), drive.parameters());
+    let path = flank.at_distance(0.0);
+    let mut points = flank_curve(&path, Position::valley(drive.lobes()), density, stop)?.points;
     points.pop();
-    let p = drive.parameters();
     let valley_mm = flank.locus().cam_inner_radius_mm() + p.tooth_radius_mm;
     points.push(on_circle(valley_mm, PI / p.ring_teeth as f64));
     Ok(points)
@@ -218,13 +203,13 @@ fn path_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<P
 /// Returns the wave generator from the middle of a lobe to the adjacent valley, offset inward by less than its least
 /// radius of curvature.
 pub(crate) fn cam_half_lobe(
-    locus: &Locus,
+    locus: &dyn Kind,
     clearance_mm: f64,
     density: Density,
     stop: &dyn Stop,
 ) -> Result<SampledCurve, SolveError> {
     let lobes = locus.lobes();
-    let outline = |place| locus.cam_outline(clearance_mm, place);
+    let outline = |place| locus.outline(clearance_mm, place);
     let mut curve = sampled(Position::lobe(lobes), Position::valley(lobes), density, stop, outline)?;
     // The last point is on the valley's line.
     if let Some(last) = curve.points.last_mut() {
@@ -280,7 +265,7 @@ pub(crate) fn direction(numerator: u32, denominator: u32) -> Vector2<f64> {
     Vector2::new(cos, sin)
 }
 
-fn on_circle(radius_mm: f64, angle_rad: f64) -> Point2<f64> {
+pub(crate) fn on_circle(radius_mm: f64, angle_rad: f64) -> Point2<f64> {
     let (sin, cos) = angle_rad.sin_cos();
     Point2::new(radius_mm * cos, radius_mm * sin)
 }
@@ -295,7 +280,7 @@ pub(crate) fn sampled(
     curve: impl Fn(Position) -> Result<CurvePoint, NotConverged>,
 ) -> Result<SampledCurve, SolveError> {
     // Measured from the valley, where cusps are. Beyond the middle a `Position` is as precise from the other side.
-    let (lobes, half_rad) = (start.lobes, start.half_lobe_rad());
+    let (lobes, half_rad) = (start.lobes, half_lobe_rad(start.lobes));
     let at = |x: f64| {
         if x <= end.from_valley_rad {
             curve(end)

@@ -5,17 +5,17 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point2, Unit, Vector2};
 
-use crate::cam::ToothCenter;
-use crate::locus::Locus;
+use crate::cam::{Cam, Kind, ToothCenter};
 use crate::position::{Position, half_lobe_rad};
 use crate::root::{NotConverged, bracketed};
 
 /// The flank of the ring's teeth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RingFlank {
-    locus: Locus,
+    pub(crate) cam: Cam,
     teeth_per_wave: f64,
-    distance_mm: f64,
+    /// Distance from the path of the tooth centres, `r` without clearance.
+    pub(crate) distance_mm: f64,
 }
 
 /// Contact of a tooth with the ring: on its flank, or on the corner that ends it.
@@ -70,7 +70,7 @@ impl RingTooth {
         let natural = flank.natural_limit()?;
         let natural_tip_radius_mm = match natural.end {
             FlankEnd::Undercut => {
-                let tooth = flank.locus.at(natural.position)?;
+                let tooth = flank.locus().at(natural.position)?;
                 flank.radius_mm(&tooth, &flank.at(&tooth))
             }
             FlankEnd::RegularTip | FlankEnd::Bore => flank.regular_tip_radius_mm(),
@@ -91,7 +91,10 @@ impl RingTooth {
 
     /// Returns the engaged tooth with the largest pressure angles. It is at the steepest point of the path, or at the
     /// end of the flank if that comes first.
-    pub(crate) fn steepest_engaged(&self) -> Result<ToothCenter, NotConverged> {
+    ///
+    /// # Errors
+    /// [`NotConverged`] from the path.
+    pub fn steepest_engaged(&self) -> Result<ToothCenter, NotConverged> {
         let locus = self.flank.locus();
         let steepest = locus.steepest()?;
         if steepest.position.from_valley_rad >= self.limit.position.from_valley_rad {
@@ -126,7 +129,7 @@ impl TipCorner {
         if limit.end == FlankEnd::RegularTip {
             return Ok(None);
         }
-        let center = flank.locus.at(limit.position)?;
+        let center = flank.locus().at(limit.position)?;
         let flank_end = flank.at(&center);
         let from_tip_rad =
             if limit.end == FlankEnd::Undercut { 0.0 } else { flank.angle_from_tip_rad(&center, &flank_end) };
@@ -190,38 +193,33 @@ impl TipCorner {
 }
 
 impl RingFlank {
-    pub(crate) const fn new(locus: Locus, teeth_per_wave: f64) -> Self {
-        Self { locus, teeth_per_wave, distance_mm: locus.tooth_radius_mm() }
+    pub(crate) fn new(cam: Cam, teeth_per_wave: f64) -> Self {
+        Self { cam, teeth_per_wave, distance_mm: cam.kind().tooth_radius_mm() }
     }
 
-    /// Returns the same flank offset outward along its normal.
-    pub(crate) fn set_back_by(self, clearance_mm: f64) -> Self {
-        Self { distance_mm: self.distance_mm + clearance_mm, ..self }
+    /// Returns the flank at another distance from the path.
+    pub(crate) const fn at_distance(self, distance_mm: f64) -> Self {
+        Self { distance_mm, ..self }
     }
 
     /// Returns the radius of the ring at the middle of its tooth space, `d_l + r` without clearance.
     pub fn root_radius_mm(&self) -> f64 {
-        self.locus.cam_outer_radius_mm() + self.height_over_cam_mm()
+        self.locus().cam_outer_radius_mm() + self.height_over_cam_mm()
     }
 
     /// Returns the radius of a regular tip, `d_v + r` without clearance.
     fn regular_tip_radius_mm(&self) -> f64 {
-        self.locus.cam_inner_radius_mm() + self.height_over_cam_mm()
-    }
-
-    /// Returns the distance of the flank from the path of the tooth centres, `r` without clearance.
-    pub(crate) const fn distance_mm(&self) -> f64 {
-        self.distance_mm
+        self.locus().cam_inner_radius_mm() + self.height_over_cam_mm()
     }
 
     /// Returns the distance of cam and flank along a common normal, `2r` without clearance.
     fn height_over_cam_mm(&self) -> f64 {
-        self.locus.tooth_radius_mm() + self.distance_mm
+        self.locus().tooth_radius_mm() + self.distance_mm
     }
 
-    /// Returns the path to which the flank is parallel.
-    pub const fn locus(&self) -> &Locus {
-        &self.locus
+    /// Returns the wave generator, whose path of tooth centres the flank is parallel to.
+    pub const fn locus(&self) -> &dyn Kind {
+        self.cam.kind()
     }
 
     /// Returns `k = Z_K / U`.
@@ -289,7 +287,7 @@ impl RingFlank {
 
     /// Returns `d_v (1 + rκ)` at the tip, with r the flank's distance.
     fn tip_regularity_mm(&self) -> f64 {
-        let bend = self.locus.cam().kind().tip_bend(self.locus.tooth_radius_mm(), self.teeth_per_wave);
+        let bend = self.locus().tip_bend(self.teeth_per_wave);
         self.regular_tip_radius_mm() - self.distance_mm * bend
     }
 
@@ -300,16 +298,15 @@ impl RingFlank {
 
     /// Returns the least tooth radius that undercuts; none if no radius does.
     pub fn critical_tooth_radius_mm(&self) -> Option<f64> {
-        self.locus.cam().kind().critical_tooth_radius_mm(self.teeth_per_wave)
+        self.locus().critical_tooth_radius_mm(self.teeth_per_wave)
     }
 
     /// Returns the least distance from the path of the centres at which this flank is undercut. For an ellipse it is
     /// `(b + r)/(k² (a² - b²)/(a² + br) - 1)`, and equals the critical tooth radius if distance and radius are equal.
     /// Returns none if no distance undercuts.
     pub(crate) fn critical_distance_mm(&self) -> Option<f64> {
-        let r = self.locus.tooth_radius_mm();
-        let bend = self.locus.cam().kind().tip_bend(r, self.teeth_per_wave);
-        (bend > 1.0).then(|| (self.locus.cam_inner_radius_mm() + r) / (bend - 1.0))
+        let bend = self.locus().tip_bend(self.teeth_per_wave);
+        (bend > 1.0).then(|| (self.locus().cam_inner_radius_mm() + self.locus().tooth_radius_mm()) / (bend - 1.0))
     }
 
     /// Returns the end of the flank without a bore.
@@ -319,12 +316,12 @@ impl RingFlank {
     /// root grows from 0 like a square root.
     fn natural_limit(&self) -> Result<FlankLimit, NotConverged> {
         if !self.is_undercut() {
-            return Ok(FlankLimit { position: Position::valley(self.locus.lobes()), end: FlankEnd::RegularTip });
+            return Ok(FlankLimit { position: Position::valley(self.locus().lobes()), end: FlankEnd::RegularTip });
         }
-        let lobes = self.locus.lobes();
+        let lobes = self.locus().lobes();
         let k = self.teeth_per_wave;
         let gap = |position: Position| -> Result<f64, NotConverged> {
-            let tooth = self.locus.at(position)?;
+            let tooth = self.locus().at(position)?;
             let point = self.at(&tooth);
             let r = self.distance_mm;
             let widening = k * (position.from_valley_rad / k).tan() / position.phase_cos;
@@ -342,7 +339,7 @@ impl RingFlank {
     /// # Errors
     /// [`NotConverged`] if the crossing is not found.
     pub fn position_at_radius(&self, bore_mm: f64) -> Result<Position, NotConverged> {
-        let (a, b) = (self.locus.cam_outer_radius_mm(), self.locus.cam_inner_radius_mm());
+        let (a, b) = (self.locus().cam_outer_radius_mm(), self.locus().cam_inner_radius_mm());
         let height_mm = self.height_over_cam_mm();
         // Differences first: a bore may be as near to tip or root as its digits can express.
         let above_tip_mm = bore_mm - b - height_mm;
@@ -350,7 +347,7 @@ impl RingFlank {
         let above_tip_mm2 = above_tip_mm * (bore_mm + b + height_mm);
         let below_root_mm2 = below_root_mm * (bore_mm + a + height_mm);
         let excess = |position: Position| -> Result<f64, NotConverged> {
-            let tooth = self.locus.at(position)?;
+            let tooth = self.locus().at(position)?;
             Ok(if position.from_valley_rad < position.from_lobe_rad {
                 self.rise_above_tip_mm2(&tooth) - above_tip_mm2
             } else {
@@ -368,7 +365,7 @@ impl RingFlank {
         at_tip: f64,
         function: impl Fn(Position) -> Result<f64, NotConverged>,
     ) -> Result<Position, NotConverged> {
-        let lobes = self.locus.lobes();
+        let lobes = self.locus().lobes();
         let quarter_rad = 0.5 * half_lobe_rad(lobes);
         let middle = function(Position::from_valley(quarter_rad, lobes))?;
         Ok(if middle > 0.0 {
@@ -383,8 +380,8 @@ impl RingFlank {
     /// Returns `R² - (d_v + r)²`, without clearance. It is free of cancellation, except that of the flank itself near
     /// undercut.
     fn rise_above_tip_mm2(&self, tooth: &ToothCenter) -> f64 {
-        let (b, r) = (self.locus.cam_inner_radius_mm(), self.locus.tooth_radius_mm());
-        let center_rise_mm2 = self.locus.cam().kind().center_rise_mm2(r, tooth);
+        let (b, r) = (self.locus().cam_inner_radius_mm(), self.locus().tooth_radius_mm());
+        let center_rise_mm2 = self.locus().center_rise_mm2(tooth);
         let center_rise_mm = center_rise_mm2 / (tooth.center_radius_mm + b + r);
         let point = self.at(tooth);
         center_rise_mm2
@@ -393,8 +390,8 @@ impl RingFlank {
 
     /// Returns `(d_l + r)² - R²`, without clearance, as a sum of positive terms.
     fn drop_below_root_mm2(&self, tooth: &ToothCenter) -> f64 {
-        let (a, r) = (self.locus.cam_outer_radius_mm(), self.locus.tooth_radius_mm());
-        let center_drop_mm2 = self.locus.cam().kind().center_drop_mm2(r, tooth);
+        let (a, r) = (self.locus().cam_outer_radius_mm(), self.locus().tooth_radius_mm());
+        let center_drop_mm2 = self.locus().center_drop_mm2(tooth);
         let center_drop_mm = center_drop_mm2 / (a + r + tooth.center_radius_mm);
         let point = self.at(tooth);
         center_drop_mm2 + 2.0 * self.distance_mm * (center_drop_mm + tooth.center_radius_mm * versine(&point))

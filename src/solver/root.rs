@@ -161,3 +161,25 @@ pub fn bracketed(
     }
     Err(NotConverged { what, iterations: MAX_ITERATIONS, bracket_width: (b - a).abs() })
 }
+
+/// Returns the least value that a function with one minimum has at the places of a golden-section search, and the middle
+/// of the last bracket. Each step leaves 0.62 of the bracket.
+///
+/// # Errors
+/// The first error of `function`.
+pub(crate) fn golden_section<E>(
+    mut low: f64,
+    mut high: f64,
+    steps: u32,
+    mut function: impl FnMut(f64) -> Result<f64, E>,
+) -> Result<(f64, f64), E> {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let mut least = f64::INFINITY;
+    for _ in 0..steps {
+        let (left, right) = (high - golden * (high - low), low + golden * (high - low));
+        let (at_left, at_right) = (function(left)?, function(right)?);
+        least = least.min(at_left).min(at_right);
+        if at_left < at_right { high = right } else { low = left }
+    }
+    Ok((least, 0.5 * (low + high)))
+}

@@ -1,15 +1,15 @@
 //! Tooth space of the ring as made: its flank offset by a clearance and shaped by a modification
 //! (docs/explanation/theory.md section 8).
 
-use nalgebra::{Point2, Unit, Vector2};
+use nalgebra::{Unit, Vector2};
 
 use crate::cam::CurvePoint;
 use crate::drive::{Drive, DriveError};
 use crate::gaps::{MM_PER_UM, Modification, RAD_PER_ARCSEC, TipRelief};
 use crate::position::{Position, half_lobe_rad};
-use crate::profile::{Density, SampledCurve, flank_curve, sampled};
+use crate::profile::{Density, SampledCurve, flank_curve, on_circle, sampled};
 use crate::ring::{FlankEnd, RingFlank, RingTooth};
-use crate::root::{NotConverged, bracketed};
+use crate::root::{NotConverged, bracketed, golden_section};
 use crate::violation::{Modified, Violation};
 use crate::{SolveError, Stop};
 
@@ -118,7 +118,7 @@ impl ToothSpace {
             let limit = Some((least_set_back_mm - clearance_mm) / MM_PER_UM);
             return Err(leaves_nothing(Modified::RingEquidistant, modification.ring_equidistant_um, limit));
         }
-        let flank = drive.flank().set_back_by(clearance_mm + equidistant_mm);
+        let flank = drive.flank().at_distance(drive.flank().distance_mm + (clearance_mm + equidistant_mm));
         let set_back = RingTooth::new(flank, bore_mm)?;
         let Some(shaped) = ShapedFlank::new(drive, flank, modification) else {
             return Ok(Self { set_back, shaped: None });
@@ -143,7 +143,7 @@ impl ToothSpace {
     pub(crate) fn undercutting_distance_mm(&self) -> Option<(f64, f64)> {
         let RingTooth { flank, limit, .. } = &self.set_back;
         let critical_mm = flank.critical_distance_mm().filter(|_| limit.end == FlankEnd::Undercut)?;
-        Some((flank.distance_mm(), critical_mm))
+        Some((flank.distance_mm, critical_mm))
     }
 
     /// Returns the largest radius of the space: that of the root, or of a tip relief beyond it.
@@ -161,7 +161,7 @@ impl ToothSpace {
 
     pub(crate) fn half(&self, density: Density, stop: &dyn Stop) -> Result<HalfSpace, SolveError> {
         let Some(ShapedSpace { flank, start, end, .. }) = &self.shaped else {
-            let pieces = vec![flank_curve(&self.set_back.flank, &self.set_back.limit, density, stop)?];
+            let pieces = vec![flank_curve(&self.set_back.flank, self.set_back.limit.position, density, stop)?];
             return Ok(HalfSpace { root_arc_rad: 0.0, is_smooth_at_root: true, pieces });
         };
         let lobes = flank.flank.locus().lobes();
@@ -213,7 +213,7 @@ impl ShapedFlank {
     /// Returns the distance from the path and its derivative by ψ. `is_relieved` selects the side at the start of the
     /// relief.
     fn distance_mm(&self, position: &Position, is_relieved: bool) -> (f64, f64) {
-        let plain_mm = self.flank.distance_mm();
+        let plain_mm = self.flank.distance_mm;
         let Some(Relief { amount_mm, start_rad, length_rad, power }) = self.relief.filter(|_| is_relieved) else {
             return (plain_mm, 0.0);
         };
@@ -274,13 +274,12 @@ impl ShapedFlank {
         is_relieved: bool,
     ) -> Result<CurvePoint, NotConverged> {
         let lobes = position.lobes;
-        let beside_rad = BESIDE_SHARE_OF_HALF_LOBE * position.half_lobe_rad();
+        let beside_rad = BESIDE_SHARE_OF_HALF_LOBE * half_lobe_rad(lobes);
         let tangent = |psi: f64| self.at(Position::from_lobe(psi, lobes), is_relieved).map(|at| at.tangent);
         let before = tangent((position.from_lobe_rad - beside_rad).max(from.from_lobe_rad))?;
         let behind = tangent((position.from_lobe_rad + beside_rad).min(to.from_lobe_rad))?;
         let at = self.at(position, is_relieved)?;
-        let (sin, cos) = at.angle_rad.sin_cos();
-        let point = Point2::new(at.radius_mm * cos, at.radius_mm * sin);
+        let point = on_circle(at.radius_mm, at.angle_rad);
         Ok(CurvePoint { point, tangent: at.tangent, bend: before.perp(&behind) })
     }
 
@@ -310,7 +309,9 @@ impl ShapedFlank {
         let mut most_mm = radii_mm.iter().copied().fold(root_mm, f64::max);
         for (around, radii_mm) in places.windows(3).zip(radii_mm.windows(3)) {
             if radii_mm[1] >= radii_mm[0] && radii_mm[1] >= radii_mm[2] {
-                most_mm = most_mm.max(summit(around[0], around[2], radius_mm)?);
+                // With both signs turned, the maximum is a minimum.
+                let (least, _) = golden_section(-around[2], -around[0], SECTIONS, |x| Ok(-radius_mm(-x)?))?;
+                most_mm = most_mm.max(-least);
             }
         }
         // Excess over the root by rounding alone is ignored.
@@ -332,7 +333,14 @@ impl ShapedFlank {
         // Flanks that are rotated towards each other start at their crossing in the middle of the space.
         let mut start = Position::lobe(lobes);
         if self.turned_rad < 0.0 {
-            let Some(beyond) = first(places(), |x| Ok(relieved(place(x))?.angle_rad > 0.0))? else { return Ok(None) };
+            let mut beyond = None;
+            for x in places() {
+                if relieved(place(x))?.angle_rad > 0.0 {
+                    beyond = Some(x);
+                    break;
+                }
+            }
+            let Some(beyond) = beyond else { return Ok(None) };
             let angle = |psi: f64| Ok(relieved(Position::from_lobe(psi, lobes))?.angle_rad);
             let psi = bracketed("start of a turned flank", 0.0, self.turned_rad, half_rad - beyond, angle)?;
             start = Position::from_lobe(psi, lobes);
@@ -368,71 +376,34 @@ impl ShapedFlank {
                 return Ok(None);
             }
         }
+        let mut found = None;
         let mut before = start.from_valley_rad;
         for x in places().filter(|&x| x < start.from_valley_rad) {
             if !is_flank(&relieved(place(x))?) {
                 return Ok(None);
             }
-            let mut first_end: Option<(f64, FlankEnd)> = None;
             for end in ENDS {
                 let value = margin(end, place(x))?;
                 if value < 0.0 {
                     let at = bracketed("end of a modified flank", x, value, before, |x| margin(end, place(x)))?;
-                    if first_end.is_none_or(|(other, _)| at > other) {
-                        first_end = Some((at, end));
+                    if found.is_none_or(|(other, _)| at > other) {
+                        found = Some((at, end));
                     }
                 }
             }
-            if let Some((x, kind)) = first_end {
-                let end = place(x);
-                let radius_mm = match (kind, bore_mm) {
-                    (FlankEnd::Bore, Some(bore_mm)) => bore_mm,
-                    _ => relieved(end)?.radius_mm,
-                };
-                let has_land = is_turned_together || kind != FlankEnd::Undercut;
-                let outermost_radius_mm = self.outermost_radius_mm(start, end)?;
-                let tip = Tip { radius_mm, has_land };
-                return Ok(Some(ShapedSpace { flank: self, start, end, tip, outermost_radius_mm }));
+            if found.is_some() {
+                break;
             }
             before = x;
         }
-        let end = Position::valley(lobes);
-        let tip = Tip { radius_mm: relieved(end)?.radius_mm, has_land: is_turned_together };
+        let end = found.map_or(Position::valley(lobes), |(x, _)| place(x));
+        let kind = found.map(|(_, kind)| kind);
+        let radius_mm = match (kind, bore_mm) {
+            (Some(FlankEnd::Bore), Some(bore_mm)) => bore_mm,
+            _ => relieved(end)?.radius_mm,
+        };
+        let has_land = is_turned_together || kind.is_some_and(|kind| kind != FlankEnd::Undercut);
         let outermost_radius_mm = self.outermost_radius_mm(start, end)?;
-        Ok(Some(ShapedSpace { flank: self, start, end, tip, outermost_radius_mm }))
+        Ok(Some(ShapedSpace { flank: self, start, end, tip: Tip { radius_mm, has_land }, outermost_radius_mm }))
     }
-}
-
-/// Returns the maximum of a function that rises and then falls between two arguments, by golden-section search.
-fn summit(
-    mut low: f64,
-    mut high: f64,
-    function: impl Fn(f64) -> Result<f64, NotConverged>,
-) -> Result<f64, NotConverged> {
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let mut most = f64::NEG_INFINITY;
-    for _ in 0..SECTIONS {
-        let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-        let (at_left, at_right) = (function(left)?, function(right)?);
-        most = most.max(at_left).max(at_right);
-        if at_left < at_right {
-            low = left;
-        } else {
-            high = right;
-        }
-    }
-    Ok(most)
-}
-
-/// Returns the first of some arguments at which a condition holds.
-fn first(
-    places: impl Iterator<Item = f64>,
-    holds: impl Fn(f64) -> Result<bool, NotConverged>,
-) -> Result<Option<f64>, NotConverged> {
-    for place in places {
-        if holds(place)? {
-            return Ok(Some(place));
-        }
-    }
-    Ok(None)
 }

@@ -1,24 +1,19 @@
 //! Shared parsing of study documents: errors, names of quantities, whole numbers.
 
 use toothwave_calculation::field::{FieldCode, FieldError};
-use toothwave_calculation::json::Fault;
 pub(crate) use toothwave_calculation::json::escaped;
-use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
+use toothwave_calculation::no_answer::NoAnswer;
 
 use crate::quantity::Quantity;
 
 /// Returns an error of the study document.
 pub(crate) fn fault(pointer: &str, code: FieldCode, detail: impl Into<String>) -> NoAnswer {
-    Fault::at(pointer, code, detail).into()
+    FieldError::at(pointer, code, detail).into()
 }
 
 /// Returns an error of a value beyond a limit.
 pub(crate) fn beyond(pointer: &str, code: FieldCode, detail: impl Into<String>, value: f64, limit: f64) -> NoAnswer {
-    let detail = detail.into();
-    let error =
-        FieldError { pointer: pointer.into(), code, detail: detail.clone(), value: Some(value), limit: Some(limit) };
-    let text = if pointer.is_empty() { detail } else { format!("{pointer}: {detail}") };
-    NoAnswer::at_fields(NoAnswerCode::InvalidDocument, text, vec![error])
+    FieldError { value: Some(value), limit: Some(limit), ..FieldError::at(pointer, code, detail) }.into()
 }
 
 /// Checks that a value lies within a range, and converts it to a whole number.

@@ -1,7 +1,8 @@
 //! Documents of earlier versions, without their deprecated fields.
 
 use toothwave_calculation::convert::{self, convert_base, converted_pointer, written};
-use toothwave_calculation::json::{self, Fault, Tree, path};
+use toothwave_calculation::field::FieldError;
+use toothwave_calculation::json::{self, Tree, path};
 use toothwave_calculation::no_answer::NoAnswer;
 
 use crate::study::{Limits, Study};
@@ -22,14 +23,14 @@ pub fn converted(text: &[u8]) -> Result<String, NoAnswer> {
 }
 
 /// Converts the base, the pointers to the varied fields, and the values of these fields in the designs to start with.
-fn convert_study(tree: &mut Tree) -> Result<(), Fault> {
+fn convert_study(tree: &mut Tree) -> Result<(), FieldError> {
     let Tree::Object(fields) = tree else { return Ok(()) };
     let mut renamed = Vec::new();
     for (list, pointers) in fields.iter_mut().filter(|(name, _)| LISTS_OF_POINTERS.contains(&&**name)) {
         let Tree::Object(pointers) = pointers else { continue };
         for (pointer, _) in pointers {
             let new = converted_pointer(pointer)
-                .map_err(|found| Fault { pointer: String::new(), ..found }.within(pointer).within(list))?;
+                .map_err(|found| FieldError { pointer: String::new(), ..found }.within(pointer).within(list))?;
             if new != *pointer {
                 renamed.push((std::mem::replace(pointer, new.clone()), new));
             }

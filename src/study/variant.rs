@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use form::{Form, is_within};
 use toothwave_calculation::design::Design;
-use toothwave_calculation::field::FieldCode;
-use toothwave_calculation::json::{Fault, Tree, path};
+use toothwave_calculation::field::{FieldCode, FieldError};
+use toothwave_calculation::json::{Tree, path};
 use toothwave_calculation::no_answer::NoAnswer;
 
 use crate::ask::{beyond, escaped, fault};
@@ -306,8 +306,8 @@ impl Template {
         &self,
         base: &Tree,
         combination: usize,
-        all_left_out: &mut BTreeMap<Vec<String>, Fault>,
-    ) -> Result<Form, Fault> {
+        all_left_out: &mut BTreeMap<Vec<String>, FieldError>,
+    ) -> Result<Form, FieldError> {
         let mut form = Form {
             tree: base.clone(),
             takes: vec![true; self.variables.len()],

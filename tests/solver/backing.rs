@@ -10,7 +10,7 @@ use toothwave_solver::drive::Draft;
 use toothwave_solver::findings;
 use toothwave_solver::fingers::{FOOT_IN_DISC, FingerBeam, Fingers};
 use toothwave_solver::model_error::{self, Beyond, Held, HeldCase, ModelError};
-use toothwave_solver::parts::PartsParameters;
+use toothwave_solver::parts::{CarrierRadii, PartsParameters};
 use toothwave_solver::{
     Contact, ContactLaw, Deviations, DriveParameters, Finding, FindingCode, LoadCase, LoadParameters, Material,
     Materials, PerContact, Severity, ToothShape,
@@ -312,7 +312,10 @@ fn only_makeable_parts_with_line_contact_have_estimates() {
     assert_eq!(of(&PAPER_5_1, PartsParameters::default()), [&rims[..], &fingers].concat());
     let without_rim = PartsParameters { ring_outer_radius_mm: Some(60.0), ..PartsParameters::default() };
     assert_eq!(of(&PAPER_5_1, without_rim), fingers);
-    let without_walls = PartsParameters { carrier_inner_radius_mm: Some(70.0), ..PartsParameters::default() };
+    let without_walls = PartsParameters {
+        carrier: CarrierRadii { inner_mm: Some(70.0), outer_mm: None },
+        ..PartsParameters::default()
+    };
     assert_eq!(of(&PAPER_5_1, without_walls), rims);
     let balls = DriveParameters { tooth: ToothShape::Ball { groove_radius_mm: PerContact::default() }, ..PAPER_5_1 };
     assert!(of(&balls, all).is_empty());

@@ -231,7 +231,8 @@ fn random_drive(index: usize, random: &mut Random) -> DriveParameters {
         let Ok(natural) = Drive::new(&p) else { continue };
         if index % 2 == 1 {
             let share = random.between(0.05, 0.35);
-            p.tip_radius_mm = Some((1.0 - share) * natural.natural_tip_radius_mm() + share * natural.root_radius_mm());
+            p.tip_radius_mm =
+                Some((1.0 - share) * natural.ring_tooth().natural_tip_radius_mm + share * natural.root_radius_mm());
         }
         if Drive::new(&p).is_ok_and(|drive| Mesh::new(&drive).engaged_spacings() > 2.0) {
             return p;

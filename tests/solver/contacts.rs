@@ -47,7 +47,7 @@ fn exactly_loaded_teeth_close_their_gaps() {
                     for tooth in &teeth {
                         let weights = weights(&possible, tooth, compatibility);
                         let force_n = loaded.forces_n(tooth, &wind_up).unwrap();
-                        let lever_arm_mm = tooth.center.cam_contact.lever_arm_mm;
+                        let lever_arm_mm = tooth.center.lever_arm_mm;
                         torque_nmm += 2.0 * force_n.wave_generator * lever_arm_mm;
                         let turned_mm = wind_up.rotation_rad() * lever_arm_mm;
                         let of = |term: &dyn Fn(Contact) -> f64| -> f64 {
@@ -98,7 +98,7 @@ fn projection_takes_gaps_of_positive_weight_only() {
         tooth_radius_mm: 2.0,
         ..PAPER_5_1
     };
-    let steepest = drive(&steep).steepest_engaged().unwrap();
+    let steepest = drive(&steep).ring_tooth().steepest_engaged().unwrap();
     let k = drive(&steep).flank().teeth_per_wave();
     let sum = steepest.tan_pressure_angle.atan() + (k * steepest.tan_pressure_angle).atan();
     assert!(sum > std::f64::consts::FRAC_PI_2);
@@ -121,7 +121,7 @@ fn steepest_engaged_tooth_is_steepest_before_flank_end() {
             possible.flank().locus().at(position).unwrap().tan_pressure_angle
         });
         let steepest = tangents.fold(0.0, f64::max);
-        let found = possible.steepest_engaged().unwrap().tan_pressure_angle;
+        let found = possible.ring_tooth().steepest_engaged().unwrap().tan_pressure_angle;
         assert!((found / steepest - 1.0).abs() < 1e-6, "{found} {steepest}");
     }
     assert!(drive(&short).flank_limit().position.from_lobe_deg() < 40.0, "the path is steepest beyond");

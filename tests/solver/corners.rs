@@ -225,7 +225,7 @@ fn tooth_before_flank_is_point_on_three_springs() {
             let turned = sweep.input_angles.wind_up_deg[angle.unwrap()].to_radians();
             let position = Position::from_lobe(states.position_deg[at].to_radians(), drive.lobes());
             let center = drive.flank().locus().at(position).unwrap();
-            let arm_mm = center.cam_contact.lever_arm_mm;
+            let arm_mm = center.lever_arm_mm;
             // Contact starts when the rotation has closed the ring's rotation and the slot's gap.
             let turned = turned
                 - drive.flank().teeth_per_wave() * turned_rad

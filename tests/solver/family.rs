@@ -113,7 +113,7 @@ pub(crate) fn any_of_the_family() -> impl Strategy<Value = DriveParameters> {
             let lobes = wave_generator.lobes();
             let unbored = of(wave_generator, teeth, installed, if more { teeth + lobes } else { teeth - lobes }, r);
             let natural = Drive::new(&unbored).ok()?;
-            let (tip_mm, root_mm) = (natural.natural_tip_radius_mm(), natural.root_radius_mm());
+            let (tip_mm, root_mm) = (natural.ring_tooth().natural_tip_radius_mm, natural.root_radius_mm());
             let tip_radius_mm = bore.map(|share| tip_mm + 0.5 * share * (root_mm - tip_mm));
             let parameters = DriveParameters { tip_radius_mm, ..unbored };
             Mesh::new(&Drive::new(&parameters).ok()?).always_carries().then_some(parameters)
@@ -186,10 +186,10 @@ fn path_slope_and_curvature_match_differences() {
             // Curvature of the path in polar form, and of the cam as a parallel curve.
             let path = (d * d + 2.0 * slope * slope - d * bend) / (d * d + slope * slope).powf(1.5);
             let cam = path / (1.0 - p.tooth_radius_mm * path);
-            let found = tooth.cam_contact.curvature_per_mm;
+            let found = tooth.cam_curvature_per_mm;
             assert!((found - cam).abs() < 1e-4 * (1.0 / d + cam.abs()), "{found} is not {cam} of {p:?}");
-            assert!((tooth.cam_contact.lever_arm_mm - d * (t / t.hypot(1.0))).abs() < 1e-8 * d);
-            assert!((tooth.cam_contact.support_mm - (d / t.hypot(1.0) - p.tooth_radius_mm)).abs() < 1e-8 * d);
+            assert!((tooth.lever_arm_mm - d * (t / t.hypot(1.0))).abs() < 1e-8 * d);
+            assert!((tooth.support_mm - (d / t.hypot(1.0) - p.tooth_radius_mm)).abs() < 1e-8 * d);
         }
     }
 }
@@ -200,7 +200,7 @@ fn position_is_accurate_near_lobe_and_valley() {
     for p in family() {
         let drive = drive(&p);
         let (locus, lobes) = (drive.flank().locus(), drive.lobes());
-        let lever_mm = |position| locus.at(position).unwrap().cam_contact.lever_arm_mm;
+        let lever_mm = |position| locus.at(position).unwrap().lever_arm_mm;
         for at in [1e-5, 1e-9, 1e-13] {
             let ratio = lever_mm(Position::from_lobe(at, lobes)) / lever_mm(Position::from_lobe(0.5 * at, lobes));
             assert!((ratio - 2.0).abs() < 2e-9 * at / 1e-9 * at / 1e-9 + 1e-8 * f64::from(u8::from(at > 1e-6)) + 1e-13);
@@ -284,7 +284,7 @@ fn ring_is_boundary_of_swept_circles() {
             assert!((swept_mm - flank_mm).abs() < 1e-9 * flank_mm, "{swept_mm} is not {flank_mm} at {share} of {p:?}");
         }
         let tip_mm = farthest_swept_mm(&p, PI / p.ring_teeth as f64);
-        assert!((tip_mm - drive.natural_tip_radius_mm()).abs() < 1e-9 * tip_mm, "{tip_mm} of {p:?}");
+        assert!((tip_mm - drive.ring_tooth().natural_tip_radius_mm).abs() < 1e-9 * tip_mm, "{tip_mm} of {p:?}");
         match drive.flank_limit().end {
             FlankEnd::Bore => {
                 let tooth = flank.locus().at(end).unwrap();
@@ -292,7 +292,7 @@ fn ring_is_boundary_of_swept_circles() {
                 assert!((end_mm - drive.tip_radius_mm()).abs() < 1e-13 * end_mm, "{end_mm} of {p:?}");
             }
             FlankEnd::RegularTip | FlankEnd::Undercut => {
-                assert_eq!(drive.tip_radius_mm(), drive.natural_tip_radius_mm())
+                assert_eq!(drive.tip_radius_mm(), drive.ring_tooth().natural_tip_radius_mm)
             }
         }
     }
@@ -619,8 +619,12 @@ fn forces(p: &DriveParameters, sample: u64, samples: u64) -> (Vector2<f64>, f64,
     let loads: Vec<_> = placed
         .iter()
         .zip(&teeth)
-        .map(|(placed, tooth)| {
-            LoadedTooth::new(placed.lobe, &tooth.center, &tooth.flank, loaded.forces_n(tooth, &wind_up).unwrap())
+        .map(|(placed, tooth)| LoadedTooth {
+            lobe: placed.lobe,
+            center: tooth.center,
+            flank: tooth.flank,
+            is_at_corner: false,
+            force_n: loaded.forces_n(tooth, &wind_up).unwrap(),
         })
         .collect();
     let sum_n = loads.iter().map(|tooth| tooth.force_n.wave_generator).sum();
@@ -860,8 +864,7 @@ fn hollow_wave_generator_runs_but_is_a_finding() {
     };
     // At R/(U² + 1) the valley is straight, which is not hollow yet.
     assert!(is_told(&path(5.21)) && !is_told(&path(5.2)) && !is_told(&path(5.19)));
-    let valley =
-        |p: &DriveParameters| drive(p).flank().locus().at(Position::valley(3)).unwrap().cam_contact.curvature_per_mm;
+    let valley = |p: &DriveParameters| drive(p).flank().locus().at(Position::valley(3)).unwrap().cam_curvature_per_mm;
     assert!(valley(&path(5.21)) < 0.0 && valley(&path(5.19)) > 0.0);
     let sweep = swept(&path(5.5), &load(20.0, VirtualWork), 20);
     assert!(sweep.torque_balance_residual < 1e-13);
@@ -960,7 +963,7 @@ fn bored_flank_of_every_kind_ends_at_bore() {
     for unbored in family() {
         let unbored = DriveParameters { tip_radius_mm: None, ..unbored };
         let natural = drive(&unbored);
-        let (tip_mm, root_mm) = (natural.natural_tip_radius_mm(), natural.root_radius_mm());
+        let (tip_mm, root_mm) = (natural.ring_tooth().natural_tip_radius_mm, natural.root_radius_mm());
         for share in [0.01, 0.1, 0.3, 0.6, 0.9] {
             let bore_mm = tip_mm + share * (root_mm - tip_mm);
             // A bore may leave fewer teeth than a drive needs.

@@ -24,7 +24,7 @@ pub(crate) fn johnson(torque_nm: f64) -> LoadParameters {
 
 pub(crate) fn beam(parameters: &DriveParameters) -> FingerBeam {
     let (draft, parts) = (Draft::new(parameters).unwrap(), PartsParameters::default());
-    *Backings::of(&drive(parameters), &draft, &parts, Support::default()).finger().unwrap()
+    Backings::of(&drive(parameters), &draft, &parts, Support::default()).finger.unwrap()
 }
 
 pub(crate) fn fingers(parameters: &DriveParameters, p: FingerParameters, load: &LoadParameters) -> CarrierFingers {

@@ -324,8 +324,7 @@ fn deviating_teeth_of_both_zones_share_load() {
         let wind_up = loaded.wind_up(&teeth)?;
         let forces: Vec<_> =
             teeth.iter().map(|tooth| loaded.forces_n(tooth, &wind_up).unwrap().wave_generator).collect();
-        let torque: f64 =
-            teeth.iter().zip(&forces).map(|(tooth, force)| force * tooth.center.cam_contact.lever_arm_mm).sum();
+        let torque: f64 = teeth.iter().zip(&forces).map(|(tooth, force)| force * tooth.center.lever_arm_mm).sum();
         Ok::<_, SolveError>((forces, torque))
     };
     let (alike, half) = solved(None, 1).unwrap();

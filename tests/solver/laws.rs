@@ -166,7 +166,7 @@ fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters)
     let loaded = LoadedDrive::new(&drive, &loaded).unwrap();
     let (r, width_mm) = (parameters.tooth_radius_mm, drive.tooth_width_mm());
     let law = |contact: Contact, tooth: &ToothState, force_n: f64| {
-        let cam = 1.0 / tooth.center.cam_contact.curvature_per_mm;
+        let cam = 1.0 / tooth.center.cam_curvature_per_mm;
         let curvature = match contact {
             Contact::WaveGenerator => 1.0 / r + 1.0 / cam,
             Contact::Ring => 1.0 / (r * tooth.flank.regularity),
@@ -189,7 +189,7 @@ fn worst_against_free_teeth(parameters: &DriveParameters, load: &LoadParameters)
         let mut torque = 0.0;
         for (tooth, found) in teeth.iter().zip(&found) {
             let free = free_tooth(&drive, tooth, &law, &gap_mm, wind_up.rotation_rad());
-            torque += 2.0 * free[0] * tooth.center.cam_contact.lever_arm_mm;
+            torque += 2.0 * free[0] * tooth.center.lever_arm_mm;
             for (free, (_, found)) in free.iter().zip(found.iter()) {
                 worst = worst.max((free - found).abs() / peak);
             }
@@ -582,7 +582,7 @@ fn hertz_pressure_closes_whole_contact_ellipse() {
 fn flat_approach_is_mean_under_uniform_pressure() {
     let modulus = 115e3;
     for (length, width) in [(4.0_f64, 15.0_f64), (3.0, 3.0), (15.0, 4.0), (1e-4, 10.0)] {
-        let flat = FlatContact::new(length, width);
+        let flat = FlatContact { length_mm: length, width_mm: width };
         // Over the distances (u, v) of two points, each with weight (l - u)(L - v). Polar coordinates at u = v = 0.
         let steps = 400;
         let nodes = |n: u32| (0..n).map(move |i| (f64::from(i) + 0.5) / f64::from(n));
@@ -610,12 +610,12 @@ fn flat_approach_is_mean_under_uniform_pressure() {
         assert_eq!(flat.stress_mpa(flat.force_n(800.0)), 800.0);
     }
     // A square, from its closed form.
-    let square = FlatContact::new(3.0, 3.0).compliance_mm_per_n(modulus);
+    let square = FlatContact { length_mm: 3.0, width_mm: 3.0 }.compliance_mm_per_n(modulus);
     let closed = (4.0 * 1.0_f64.asinh() + (4.0 - 4.0 * 2.0_f64.sqrt()) / 3.0) / (PI * modulus * 3.0);
     assert!((square / closed - 1.0).abs() < 1e-15);
     // A narrow strip keeps its digits: to second order in t = l/L, I over L³ is 2t²(ln(2/t) + 1/2) + (2/3) t³.
     let t = 1e-9_f64;
-    let strip = FlatContact::new(t, 1.0).compliance_mm_per_n(1.0) * PI * t * t;
+    let strip = FlatContact { length_mm: t, width_mm: 1.0 }.compliance_mm_per_n(1.0) * PI * t * t;
     let series = 2.0 * t * t * ((2.0 / t).ln() + 0.5) + 2.0 / 3.0 * t * t * t;
     assert!((strip / series - 1.0).abs() < 1e-14, "{:e}", strip / series - 1.0);
 }
@@ -638,7 +638,7 @@ fn flat_sided_teeth_work_with_any_cylinder_law() {
         let mut torque = 0.0;
         for tooth in &teeth {
             let force_n = loaded.forces_n(tooth, &wind_up).unwrap();
-            torque += 2.0 * force_n.wave_generator * tooth.center.cam_contact.lever_arm_mm;
+            torque += 2.0 * force_n.wave_generator * tooth.center.lever_arm_mm;
             let d = tooth.center.center_radius_mm;
             let borne = (d + 2.0).min(65.5) - (d - 2.0).max(58.5);
             let pressure = loaded.stress_mpa(tooth, &force_n).carrier;
@@ -739,7 +739,7 @@ fn flat_projection_needs_non_negative_approach_terms() {
             let way_mm = approach_mm(force_n.wave_generator)
                 + (gamma + s * beta).cos() * approach_mm(force_n.ring)
                 + s * gamma.sin() * borne.compliance_mm_per_n(modulus_mpa) * force_n.carrier;
-            let off = way_mm / (wind_up.rotation_rad() * tooth.center.cam_contact.lever_arm_mm) - 1.0;
+            let off = way_mm / (wind_up.rotation_rad() * tooth.center.lever_arm_mm) - 1.0;
             assert!(off.abs() < 1e-12, "{law:?}: {off:e}");
         }
     }

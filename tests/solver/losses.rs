@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use proptest::prelude::*;
 use serde_json::Value;
+use toothwave_solver::cam::ToothCenter;
 use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::losses::bearing::{BearingRating, RollingElement};
 use toothwave_solver::losses::duty::{Cost, Costs, LossParameters, LossTotals};
@@ -15,11 +16,12 @@ use toothwave_solver::losses::{
     WaveGeneratorFriction, mean_over_period,
 };
 use toothwave_solver::mesh::{Mesh, Samples};
+use toothwave_solver::ring::FlankPoint;
 use toothwave_solver::sweep::{Points, States, sweep, sweep_with_deviations};
 use toothwave_solver::tooth::Pressure;
 use toothwave_solver::{
     Compatibility, Contact, ContactLaw, Deviations, DriveParameters, FieldCode, LoadCase, LoadParameters, Modification,
-    Never, Parameter, PerContact, SolveError, ToothShape, Violation, WaveGenerator,
+    Never, Parameter, PerContact, Position, SolveError, ToothShape, Violation, WaveGenerator,
 };
 
 use crate::drives::{ECCENTRIC, PAPER_5_1, PAPER_5_2, any_swept_drive, cases, drive, everywhere, load};
@@ -43,33 +45,62 @@ impl Case {
     }
 
     fn mechanism(&self, tooth_spins: bool) -> Mechanism {
-        let whole = |name: &str| u32::try_from(self.0[name].as_u64().unwrap()).unwrap();
-        Mechanism {
-            lobes: whole("lobes"),
+        let whole = |name: &str| self.0[name].as_i64().unwrap();
+        let (lobes, mean_radius_mm) = (whole("lobes"), self.float("race_radius_mm"));
+        let harmonic = |amplitude_mm| WaveGenerator::Harmonic { lobes, mean_radius_mm, amplitude_mm };
+        let eccentric = |eccentricity_mm| WaveGenerator::Eccentric { radius_mm: mean_radius_mm, eccentricity_mm };
+        let parameters = DriveParameters {
+            wave_generator: match self.name() {
+                "5.2 undercut" => PAPER_5_2.wave_generator,
+                "eccentric, carrier against the input" | "eccentric, carrier with the input" => eccentric(1.2),
+                "eccentric, steep, undercut" => eccentric(3.0),
+                "harmonic, three lobes" => harmonic(1.0),
+                "harmonic, nearly round" => harmonic(0.3),
+                "harmonic, few teeth" => harmonic(2.5),
+                "harmonic path, three lobes" => {
+                    WaveGenerator::HarmonicPath { lobes, mean_path_radius_mm: 52.0, amplitude_mm: 1.0 }
+                }
+                _ => PAPER_5_1.wave_generator,
+            },
             teeth: whole("teeth"),
             installed: whole("installed"),
             ring_teeth: whole("ring_teeth"),
             tooth_radius_mm: self.float("tooth_radius_mm"),
-            tooth_spins,
-            race_radius_mm: self.float("race_radius_mm"),
-            tells_items_apart: false,
-        }
+            ..PAPER_5_1
+        };
+        let mechanism = Mechanism { tooth_spins, ..mechanism(&parameters) };
+        assert_eq!(mechanism.race_radius_mm(), mean_radius_mm, "{}", self.name());
+        assert_eq!(i64::from(mechanism.drive.lobes()), lobes, "{}", self.name());
+        mechanism
     }
 
     fn teeth(&self) -> Vec<LoadedTooth> {
-        let placed = self.0["placed"].as_array().unwrap().iter();
-        placed
-            .map(|tooth| LoadedTooth {
-                position_rad: tooth["position_rad"].as_f64().unwrap(),
+        let lobes = self.mechanism(true).drive.lobes();
+        let tooth = |tooth: &Value| {
+            let float = |name: &str| tooth[name].as_f64().unwrap();
+            // Losses do not depend on what is NaN here.
+            LoadedTooth {
                 lobe: u32::try_from(tooth["lobe"].as_u64().unwrap()).unwrap(),
-                center_radius_mm: tooth["center_radius_mm"].as_f64().unwrap(),
-                tan_pressure_angle: tooth["tan_pressure_angle"].as_f64().unwrap(),
-                cam_curvature_per_mm: tooth["cam_curvature_per_mm"].as_f64().unwrap(),
-                regularity: tooth["regularity"].as_f64().unwrap(),
-                corner: None,
+                center: ToothCenter {
+                    position: Position::from_lobe(float("position_rad"), lobes),
+                    support_mm: f64::NAN,
+                    lever_arm_mm: f64::NAN,
+                    cam_curvature_per_mm: float("cam_curvature_per_mm"),
+                    center_radius_mm: float("center_radius_mm"),
+                    tan_pressure_angle: float("tan_pressure_angle"),
+                    tan_pressure_angle_derivative: f64::NAN,
+                },
+                flank: FlankPoint {
+                    distance_mm: f64::NAN,
+                    tan_pressure_angle: f64::NAN,
+                    cos_pressure_angle: f64::NAN,
+                    regularity: float("regularity"),
+                },
+                is_at_corner: false,
                 force_n: per_contact(&tooth["force_n"]),
-            })
-            .collect()
+            }
+        };
+        self.0["placed"].as_array().unwrap().iter().map(tooth).collect()
     }
 
     /// Returns an entry's friction, with coefficients times a factor, and its mechanism.
@@ -145,7 +176,7 @@ fn losses_match_exact_equilibrium_with_vanishing_friction() {
                     assert_eq!(*slip.slip_mm_per_rad.get(contact), 0.0, "{name}");
                 }
             }
-            let zones = mechanism.zones_in_torque();
+            let zones = mechanism.mesh.zones_in_torque();
             let lost = lost_nmm_per_rad(&turning);
             for contact in Contact::all() {
                 let expected = zones * number(&limit["work_nmm_per_rad"][code(contact)]).unwrap();
@@ -299,9 +330,9 @@ fn radial_force_is_sum_of_tooth_forces() {
             let expected = number(&case.0["radial_load_n"][axis]).unwrap();
             assert_near(load[axis], expected, 1e-13 * total, case.name());
         }
-        if mechanism.lobes == 1 {
+        if mechanism.drive.lobes() == 1 {
             // All normals of an eccentric circle meet in its centre: the load across the eccentricity makes the torque.
-            let eccentricity_mm = if mechanism.ring_teeth == 10 { 3.0 } else { 1.2 };
+            let eccentricity_mm = if mechanism.drive.parameters().ring_teeth == 10 { 3.0 } else { 1.2 };
             assert_near(load[1].abs() * eccentricity_mm, 20e3, 1e-12 * 20e3, case.name());
         }
     }
@@ -317,7 +348,13 @@ fn teeth_at(loaded: &LoadedDrive<'_>, sample: u64, samples: u64) -> Vec<LoadedTo
     let wind_up = loaded.wind_up(&states).unwrap();
     states
         .iter()
-        .map(|state| LoadedTooth::new(0, &state.center, &state.flank, loaded.forces_n(state, &wind_up).unwrap()))
+        .map(|state| LoadedTooth {
+            lobe: 0,
+            center: state.center,
+            flank: state.flank,
+            is_at_corner: false,
+            force_n: loaded.forces_n(state, &wind_up).unwrap(),
+        })
         .collect()
 }
 
@@ -346,10 +383,11 @@ fn lost_nmm_per_rad(turning: &Turning) -> f64 {
 /// Returns `M0` of these teeth: the sum of `F_H d sin γ`.
 fn input_torque_nmm(mechanism: &Mechanism, teeth: &[LoadedTooth]) -> f64 {
     let of_tooth = |tooth: &LoadedTooth| {
-        let lever_arm_mm = tooth.center_radius_mm * tooth.tan_pressure_angle / tooth.tan_pressure_angle.hypot(1.0);
+        let ToothCenter { center_radius_mm, tan_pressure_angle, .. } = tooth.center;
+        let lever_arm_mm = center_radius_mm * tan_pressure_angle / tan_pressure_angle.hypot(1.0);
         tooth.force_n.wave_generator * lever_arm_mm
     };
-    mechanism.zones_in_torque() * teeth.iter().map(of_tooth).sum::<f64>()
+    mechanism.mesh.zones_in_torque() * teeth.iter().map(of_tooth).sum::<f64>()
 }
 
 /// Returns `ν = P/(M0 ω_HS)`.
@@ -401,8 +439,8 @@ fn input_power_equals_output_power_plus_losses() {
         let turning_rad_per_s = mechanism.turning_rad_per_s(1500.0);
         let lost_w = 1e-3 * lost_nmm_per_rad(&turning) * turning_rad_per_s;
         // Speeds of wave generator, ring and carrier against the member that stands still, at this speed of the first against the last.
-        let k = mechanism.ring_teeth_per_wave();
-        let (cam, ring) = (turning_rad_per_s, -mechanism.sense() / k * turning_rad_per_s);
+        let (k, sense) = (mechanism.drive.flank().teeth_per_wave(), mechanism.drive.sense());
+        let (cam, ring) = (turning_rad_per_s, -sense / k * turning_rad_per_s);
         for fixed in [Fixed::Ring, Fixed::Carrier, Fixed::WaveGenerator] {
             let still = match fixed {
                 Fixed::Ring => ring,
@@ -410,7 +448,7 @@ fn input_power_equals_output_power_plus_losses() {
                 Fixed::WaveGenerator => cam,
             };
             // Torques without friction of the teeth on the three members. Each driven end keeps its own.
-            let torque_nm = [-3.0, 3.0 * k * -mechanism.sense(), 3.0 * (k + mechanism.sense()) * mechanism.sense()];
+            let torque_nm = [-3.0, 3.0 * k * -sense, 3.0 * (k + sense) * sense];
             let powers_w = [torque_nm[0] * (cam - still), torque_nm[1] * (ring - still), torque_nm[2] * -still];
             assert!(powers_w.iter().sum::<f64>().abs() < 1e-10);
             let out_w = powers_w.iter().copied().fold(0.0, f64::max);
@@ -446,11 +484,11 @@ fn lost_at(mechanism: &Mechanism, friction: &FrictionParameters, teeth: &[Loaded
         let at = |spin: f64| (0..3).map(|contact| limit[contact] * (v[contact] - spin).abs()).sum::<f64>();
         lost +=
             if mechanism.tooth_spins { v.iter().map(|&spin| at(spin)).fold(f64::INFINITY, f64::min) } else { at(0.0) };
-        lost += bearing.coefficient * bearing.radius_mm / mechanism.race_radius_mm
+        lost += bearing.coefficient * bearing.radius_mm / mechanism.race_radius_mm()
             * tooth.force_n.wave_generator
             * race_mm_per_rad.abs();
     }
-    lost * mechanism.zones_in_torque()
+    lost * mechanism.mesh.zones_in_torque()
 }
 
 proptest! {
@@ -466,7 +504,7 @@ proptest! {
         let load = LoadCase::new(&load(5.0, Compatibility::VirtualWork)).unwrap();
         let loaded = LoadedDrive::new(&drive, &load).unwrap();
         let mechanism = Mechanism { tooth_spins, ..mechanism(&parameters) };
-        let race_radius_mm = mechanism.race_radius_mm;
+        let race_radius_mm = mechanism.race_radius_mm();
         let bearing = RaceBearing { coefficient: on_balls, radius_mm: 0.9 * race_radius_mm };
         let friction = FrictionParameters {
             wave_generator: WaveGeneratorFriction::Race { coefficient: on_race, bearing },
@@ -497,7 +535,7 @@ proptest! {
         let friction = plain(on_cam, elsewhere);
         let lost = |mechanism: &Mechanism, friction: &Friction| lost_nmm_per_rad(&mechanism.turning(friction, &teeth));
         prop_assert!(lost(&spinning, &friction) <= lost(&flat, &friction) * (1.0 + 1e-14));
-        let bearing = |coefficient| RaceBearing { coefficient, radius_mm: spinning.race_radius_mm };
+        let bearing = |coefficient| RaceBearing { coefficient, radius_mm: spinning.race_radius_mm() };
         let race = |on_balls| WaveGeneratorFriction::Race { coefficient: on_cam, bearing: bearing(on_balls) };
         // A bearing rougher than the teeth never turns.
         let stuck = spinning.turning(&with(race(2.0 * on_cam), elsewhere), &teeth);

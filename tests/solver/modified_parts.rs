@@ -8,7 +8,7 @@ use toothwave_solver::drawing::{Body, Drawing, DrawingParameters, Edge, Outline,
 use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::gaps::{Gaps, TipRelief};
 use toothwave_solver::mesh::Place;
-use toothwave_solver::parts::{LEAST_WALL, PartsParameters, RIM};
+use toothwave_solver::parts::{CarrierRadii, LEAST_WALL, PartsParameters, RIM};
 use toothwave_solver::violation::Modified;
 use toothwave_solver::{
     Contact, Drive, DriveParameters, FieldCode, Finding, FindingCode, Modification, Never, Parameter, Part, PerContact,
@@ -141,7 +141,7 @@ fn edges(outline: &Outline) -> &[Edge] {
 /// Returns the ring's edges in one tooth space, from tip to tip.
 fn space(p: &DriveParameters, modification: Modification) -> Vec<Edge> {
     let ring = drawn(p, Subject::Part(Part::Ring), &parts(modification), 1e-4, 0.0).remove(0);
-    let edges = edges(&ring.section.holes[0]);
+    let edges = edges(&ring.holes[0]);
     let count = edges.len() / usize::try_from(p.ring_teeth).unwrap();
     assert_eq!(edges.len() % count, 0);
     edges[..count].to_vec()
@@ -261,9 +261,9 @@ fn drawn_distances_equal_model_gaps() {
         for m in modifications {
             let bodies = drawn(&p, Subject::Assembly, &parts(m), 1e-5, 7.0);
             let [ring, carrier, teeth, cam] = &bodies[..] else { panic!("{bodies:?}") };
-            let ring_points = placed_outline(&ring.section.holes[0], 0.0);
-            let cam_points = placed_outline(&cam.section.outer, cam.placements[0].rotation_rad);
-            let Outline::Circle { radius_mm, .. } = teeth.section.outer else { panic!("a tooth is round") };
+            let ring_points = placed_outline(&ring.holes[0], 0.0);
+            let cam_points = placed_outline(&cam.outer, cam.placements[0].rotation_rad);
+            let Outline::Circle { radius_mm, .. } = teeth.outer else { panic!("a tooth is round") };
             let fingers = carrier.placements.len();
             let mut looked_at = 0;
             for (slot, tooth) in teeth.placements.iter().enumerate() {
@@ -280,7 +280,7 @@ fn drawn_distances_equal_model_gaps() {
                 let gap = gaps.at(&Place::default(), &at, &drive.flank().at(&at));
                 // The wall under load is ahead of the tooth if the carrier turns forward, else behind it.
                 let finger = if sense > 0.0 { slot } else { (slot + fingers - 1) % fingers };
-                let walls = placed_outline(&carrier.section.outer, carrier.placements[finger].rotation_rad);
+                let walls = placed_outline(&carrier.outer, carrier.placements[finger].rotation_rad);
                 for (name, outline, gap_mm) in [
                     ("ring", &ring_points, gap.ring),
                     ("cam", &cam_points, gap.wave_generator),
@@ -330,7 +330,7 @@ fn modified_outlines_close_with_matching_tangents() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for m in of_the_ring() {
             let ring = drawn(&p, Subject::Part(Part::Ring), &parts(m), 1e-6, 0.0).remove(0);
-            let edges = edges(&ring.section.holes[0]);
+            let edges = edges(&ring.holes[0]);
             for (edge, next) in edges.iter().zip(edges.iter().cycle().skip(1)) {
                 assert_eq!(edge.end(), next.start());
                 let Edge::Curve { points, start_tangent, end_tangent, .. } = edge else { continue };
@@ -348,7 +348,7 @@ fn modified_outlines_close_with_matching_tangents() {
                 points.iter().zip(points.iter().cycle().skip(1)).map(|(a, b)| 0.5 * a.coords.perp(&b.coords)).sum()
             };
             let plain = drawn(&p, Subject::Part(Part::Ring), &PartsParameters::default(), 1e-4, 0.0).remove(0);
-            let ratio = shoelace(edges) / shoelace(self::edges(&plain.section.holes[0]));
+            let ratio = shoelace(edges) / shoelace(self::edges(&plain.holes[0]));
             assert!((ratio - 1.0).abs() < 5e-3, "{ratio} of {m:?} on {p:?}");
         }
     }
@@ -415,8 +415,8 @@ fn carrier_beyond_advanced_tips_is_refused() {
     ];
     let draft = Draft::new(&PAPER_5_1).unwrap();
     let of = |modification: Modification, outer_mm: f64, ring_clearance_um: f64| {
-        let carrier_outer_radius_mm = Some(outer_mm);
-        let parts = PartsParameters { carrier_outer_radius_mm, ring_clearance_um, ..parts(modification) };
+        let carrier = CarrierRadii { inner_mm: None, outer_mm: Some(outer_mm) };
+        let parts = PartsParameters { carrier, ring_clearance_um, ..parts(modification) };
         parts.violations(Part::Carrier, &draft)
     };
     for modification in forward {
@@ -470,7 +470,7 @@ fn drawing_keeps_expected_point_count() {
     for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
         for (subject, has_curves) in [
             (Subject::Part(Part::Ring), true),
-            (Subject::Part(Part::WaveGenerator), !p.wave_generator.is_eccentric_circle()),
+            (Subject::Part(Part::WaveGenerator), !matches!(p.wave_generator, WaveGenerator::Eccentric { .. })),
             (Subject::Assembly, true),
             (Subject::Part(Part::Carrier), false),
             (Subject::Part(Part::Teeth), false),
@@ -484,7 +484,7 @@ fn drawing_keeps_expected_point_count() {
                 let draft = Draft::new(&p).unwrap();
                 let drawing = Drawing::new(&draft, subject, &parts(NONE), &parameters).unwrap();
                 let bodies = drawing.bodies(&Never).unwrap();
-                let outlines = bodies.iter().flat_map(|body| body.section.holes.iter().chain([&body.section.outer]));
+                let outlines = bodies.iter().flat_map(|body| body.holes.iter().chain([&body.outer]));
                 let points: usize = outlines
                     .flat_map(|outline| if let Outline::Edges(edges) = outline { &edges[..] } else { &[] })
                     .map(|edge| if let Edge::Curve { points, .. } = edge { points.len() } else { 0 })
@@ -523,7 +523,7 @@ fn smooth_space_is_one_curve_and_relief_another() {
 fn low_relief_leaves_rim_unchanged() {
     let outer = |modification| {
         let ring = drawn(&PAPER_5_1, Subject::Part(Part::Ring), &parts(modification), 1e-2, 0.0).remove(0);
-        ring.section.outer
+        ring.outer
     };
     assert_eq!(outer(Modification { ring_tip_relief: Some(RELIEF), ..NONE }), outer(NONE));
 }
@@ -550,7 +550,7 @@ proptest! {
     ) {
         let p = [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()][which];
         let drive = drive(&p);
-        let stroke_um = 1e3 * (drive.root_radius_mm() - drive.natural_tip_radius_mm());
+        let stroke_um = 1e3 * (drive.root_radius_mm() - drive.ring_tooth().natural_tip_radius_mm);
         let amount_um = 10.0_f64.powf(amount) * if is_set_forward { -stroke_um } else { stroke_um };
         let start_deg = start.map_or(0.0, |share| share * drive.flank_limit().position.from_lobe_deg());
         let pitch_arcsec = PI / p.ring_teeth as f64 / ARCSEC;
@@ -565,15 +565,15 @@ proptest! {
         let parameters = DrawingParameters { chord_tolerance_mm: tolerance_mm, max_points: 10_000_000, input_angle_deg: 0.0 };
         let draft = Draft::new(&p).unwrap();
         let Ok(drawing) = Drawing::new(&draft, Subject::Part(Part::Ring), &parts, &parameters) else { return Ok(()) };
-        let section = drawing.bodies(&Never).unwrap().remove(0).section;
-        let of_hole = edges(&section.holes[0]);
+        let body = drawing.bodies(&Never).unwrap().remove(0);
+        let of_hole = edges(&body.holes[0]);
         let farthest = |points: &[Point2<f64>]| points.iter().map(|point| point.coords.norm()).fold(0.0, f64::max);
         let drawn_mm = of_hole.iter().map(|edge| farthest(points(edge)).max(edge.start().coords.norm())).fold(0.0, f64::max);
 
         let reach_mm = reported_reach_mm(&p, &parts);
         prop_assert!(reach_mm >= drawn_mm * (1.0 - 1e-11), "{reach_mm} told, {drawn_mm} drawn");
         prop_assert!(reach_mm <= drawn_mm + 2.0 * tolerance_mm, "{reach_mm} told, {drawn_mm} drawn");
-        let Outline::Circle { radius_mm, .. } = section.outer else { panic!("{:?}", section.outer) };
+        let Outline::Circle { radius_mm, .. } = body.outer else { panic!("{:?}", body.outer) };
         prop_assert!((radius_mm - RIM * reach_mm).abs() < 1e-12 * radius_mm);
         let thin = PartsParameters { ring_outer_radius_mm: Some(reach_mm * (1.0 + 1e-3)), ..parts };
         let found = Drawing::new(&draft, Subject::Part(Part::Ring), &thin, &parameters).unwrap().findings().unwrap();
@@ -705,7 +705,7 @@ fn chord_with_several_inflections_keeps_tolerance() {
         let parts = parts(Modification { ring_tip_relief, ..NONE });
         for tolerance_mm in [1e-6, 2e-6, 4e-6, 8e-6] {
             let ring = drawn(&p, Subject::Part(Part::Ring), &parts, tolerance_mm, 0.0).remove(0);
-            let edges = edges(&ring.section.holes[0]);
+            let edges = edges(&ring.holes[0]);
             let space = placed(&edges[..edges.len() / usize::try_from(p.ring_teeth).unwrap()], 0.0);
             let upper: Vec<_> = space.into_iter().filter(|point| point.y >= 0.0).collect();
             let start_rad = start_deg.to_radians();
@@ -753,7 +753,7 @@ fn solid_polynomials_keep_hundredth_of_chord_tolerance() {
         for tolerance_mm in [1e-2, 1e-3, 1e-5] {
             let near_mm = 0.01 * tolerance_mm;
             let ring = drawn(&p, Subject::Part(Part::Ring), &parts(NONE), tolerance_mm, 0.0).remove(0);
-            let edges = edges(&ring.section.holes[0]);
+            let edges = edges(&ring.holes[0]);
             let of_space = edges.len() / usize::try_from(p.ring_teeth).unwrap();
             for polygon in polynomials(&edges[..of_space]) {
                 for point in along(&polygon) {
@@ -764,7 +764,7 @@ fn solid_polynomials_keep_hundredth_of_chord_tolerance() {
             }
             if let WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } = p.wave_generator {
                 let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts(NONE), tolerance_mm, 0.0).remove(0);
-                for point in polynomials(self::edges(&cam.section.outer)).iter().flat_map(|polygon| along(polygon)) {
+                for point in polynomials(self::edges(&cam.outer)).iter().flat_map(|polygon| along(polygon)) {
                     // Distance from the ellipse to first order.
                     let slope = 2.0 * (point.x / (a * a)).hypot(point.y / (b * b));
                     let off_mm = ((point.x / a).powi(2) + (point.y / b).powi(2) - 1.0).abs() / slope;
@@ -781,7 +781,7 @@ fn polynomials_join_tangentially_and_end_with_curve() {
         for m in of_the_ring().into_iter().chain([NONE]) {
             for part in [Part::Ring, Part::WaveGenerator] {
                 let body = drawn(&p, Subject::Part(part), &parts(m), 1e-3, 0.0).remove(0);
-                let outline = body.section.holes.first().unwrap_or(&body.section.outer);
+                let outline = body.holes.first().unwrap_or(&body.outer);
                 let Outline::Edges(edges) = outline else { continue };
                 for edge in edges {
                     let Edge::Curve { polynomials: polygons, .. } = edge else { continue };
@@ -832,7 +832,7 @@ fn arcs_stay_within_chord_tolerance() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for tolerance_mm in [0.1, 1e-2, 1e-3, 1e-5] {
             let ring = drawn(&p, Subject::Part(Part::Ring), &parts(NONE), tolerance_mm, 0.0).remove(0);
-            let edges = edges(&ring.section.holes[0]);
+            let edges = edges(&ring.holes[0]);
             let of_space = edges.len() / usize::try_from(p.ring_teeth).unwrap();
             for point in along_arcs(&edges[..of_space]) {
                 let above = Vector2::new(point.x, point.y.abs());
@@ -841,7 +841,7 @@ fn arcs_stay_within_chord_tolerance() {
             }
             if let WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } = p.wave_generator {
                 let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts(NONE), tolerance_mm, 0.0).remove(0);
-                for point in along_arcs(self::edges(&cam.section.outer)) {
+                for point in along_arcs(self::edges(&cam.outer)) {
                     let slope = 2.0 * (point.x / (a * a)).hypot(point.y / (b * b));
                     let off_mm = ((point.x / a).powi(2) + (point.y / b).powi(2) - 1.0).abs() / slope;
                     assert!(off_mm < tolerance_mm, "{off_mm} of {tolerance_mm}");
@@ -859,6 +859,6 @@ fn eccentric_is_circle_about_its_own_centre() {
         let parts = PartsParameters { wave_generator_clearance_um: clearance_um, ..PartsParameters::default() };
         let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts, 1e-3, 0.0).remove(0);
         let expected = Outline::Circle { center: Point2::new(e, 0.0), radius_mm: r - 1e-3 * clearance_um };
-        assert_eq!(cam.section.outer, expected);
+        assert_eq!(cam.outer, expected);
     }
 }

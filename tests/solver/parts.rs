@@ -6,7 +6,7 @@ use nalgebra::{Point2, Rotation2};
 use toothwave_solver::drawing::{Drawing, DrawingParameters, Edge, Outline, Subject, widest_finger};
 use toothwave_solver::drive::Draft;
 use toothwave_solver::findings;
-use toothwave_solver::parts::PartsParameters;
+use toothwave_solver::parts::{CarrierRadii, PartsParameters};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::{
     Contact, Drive, DriveParameters, Finding, FindingCode, Modification, Never, Part, Position, Severity, SolveError,
@@ -20,8 +20,8 @@ fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> V
     let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
     let draft = Draft::new(parameters).unwrap();
     let drawing = Drawing::new(&draft, Subject::Part(part), parts, &drawing).unwrap();
-    let section = drawing.bodies(&Never).unwrap().remove(0).section;
-    let outlines = std::iter::once(section.outer).chain(section.holes);
+    let body = drawing.bodies(&Never).unwrap().remove(0);
+    let outlines = std::iter::once(body.outer).chain(body.holes);
     outlines
         .into_iter()
         .find_map(|outline| match outline {
@@ -152,7 +152,7 @@ fn greatest_cam_clearance_is_least_radius() {
         let drive = draft.drive().unwrap_or_else(|| panic!("{p:?}: {:?}", draft.violations()));
         let sharpest_mm = (0..=2000)
             .map(|i| Position::from_lobe(PI / lobes as f64 * f64::from(i) / 2000.0, drive.lobes()))
-            .map(|position| 1.0 / drive.flank().locus().at(position).unwrap().cam_contact.curvature_per_mm)
+            .map(|position| 1.0 / drive.flank().locus().at(position).unwrap().cam_curvature_per_mm)
             .filter(|&radius_mm| radius_mm > 0.0)
             .fold(f64::INFINITY, f64::min);
         let expected_um = 1e3 * least_mm.unwrap_or(sharpest_mm);
@@ -228,7 +228,7 @@ fn bore_at_undercut_tip_keeps_flank_end() {
         let unbored = DriveParameters { tooth_radius_mm: 0.7 + 1e-3 * f64::from(tenth_um), ..PAPER_5_2 };
         let Ok(natural) = Drive::new(&unbored) else { continue };
         assert_eq!(natural.flank_limit().end, FlankEnd::Undercut);
-        let tip = natural.natural_tip_radius_mm().to_bits();
+        let tip = natural.ring_tooth().natural_tip_radius_mm.to_bits();
         for tip_radius_mm in (tip..tip + 4).map(f64::from_bits) {
             let bored = drive(&DriveParameters { tip_radius_mm: Some(tip_radius_mm), ..unbored });
             let (found, end) = (bored.flank_limit().position, natural.flank_limit().position);
@@ -298,8 +298,7 @@ fn tooth_leaves_slot_with_short_walls() {
     let wall_end_mm = |radius_mm: f64| (radius_mm * radius_mm - 25.0_f64).sqrt();
     let of = |inner_mm, outer_mm| {
         let parts = PartsParameters {
-            carrier_inner_radius_mm: Some(inner_mm),
-            carrier_outer_radius_mm: Some(outer_mm),
+            carrier: CarrierRadii { inner_mm: Some(inner_mm), outer_mm: Some(outer_mm) },
             ..PartsParameters::default()
         };
         findings_as_made(&PAPER_5_1, Part::Carrier, &parts)

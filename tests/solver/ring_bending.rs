@@ -127,7 +127,7 @@ fn bending_acts_as_ring_compliance_in_load_sharing() {
                 let ring = states.force_n.ring[at] / states.force_n.wave_generator[at];
                 let carrier = states.force_n.carrier[at] / states.force_n.wave_generator[at];
                 let compliance = 1.0 / 4e5 + ring * ring * (1.0 / 3e5 + bend) + carrier * carrier / 5e5;
-                let arm_mm = tooth.cam_contact.lever_arm_mm;
+                let arm_mm = tooth.lever_arm_mm;
                 let share = arm_mm / compliance;
                 torque_nmm += f64::from(drive.lobes()) * arm_mm * share;
                 forces.push((share, states.force_n.wave_generator[at]));

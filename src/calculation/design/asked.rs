@@ -1,9 +1,8 @@
-//! Settings of the endpoints: input angles of a sweep, sampling of profiles, parts and assembly of drawings.
+//! Settings of the endpoints: input angles of a sweep, parts and assembly of drawings.
 
 use serde::{Deserialize, Serialize};
-use toothwave_solver::backing::{Rim, Support};
+use toothwave_solver::backing::Rim;
 use toothwave_solver::fingers::Fingers;
-use toothwave_solver::profile::{Extent, ProfileParameters};
 use utoipa::ToSchema;
 
 use super::number::Whole;
@@ -30,23 +29,6 @@ pub struct SweepDocument {
 
 /// Number of intervals in the paper.
 pub(super) const DEFAULT_SAMPLES: Whole = Whole(50.0);
-
-/// The sampling of profiles.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default, expecting = "an object")]
-pub struct ProfileDocument {
-    /// Largest distance of a chord from its curve, in mm. Default: 0.001 mm.
-    pub chord_tolerance_mm: f64,
-    /// Part of the ring to draw: one tooth or the full ring. Default: one tooth.
-    pub extent: Extent,
-}
-
-impl Default for ProfileDocument {
-    fn default() -> Self {
-        let ProfileParameters { chord_tolerance_mm, extent, .. } = ProfileParameters::default();
-        Self { chord_tolerance_mm, extent }
-    }
-}
 
 /// Settings of `/v1/accuracy`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -78,28 +60,12 @@ pub struct PartsDocument {
 }
 
 impl PartsDocument {
-    /// Removes the supports that are the default.
-    pub(super) fn leave_out_default_supports(&mut self) {
-        let Support { fingers, rim } = Support::default();
-        self.ring.rim.take_if(|given| *given == rim);
-        self.carrier.fingers.take_if(|given| *given == fingers);
-    }
-
     /// Returns what a drawing reads: no supports, no strength.
-    pub(super) fn as_drawn(&self) -> Self {
-        let mut parts = self.clone();
-        parts.ring.rim = None;
-        let CarrierPartDocument { inner_radius_mm, outer_radius_mm, clearance_um, .. } = parts.carrier;
-        parts.carrier =
-            CarrierPartDocument { inner_radius_mm, outer_radius_mm, clearance_um, ..CarrierPartDocument::default() };
-        parts
-    }
-
-    /// Returns the parts for keys. The name of a strength and its numbers give the same answers.
-    pub(crate) fn under_load(&self) -> Self {
-        let mut parts = self.clone();
-        parts.carrier.strength = self.carrier.strength.map(|strength| StrengthDocument::Given(strength.numbers()));
-        parts
+    pub(super) fn drawn(mut self) -> Self {
+        self.ring.rim = None;
+        self.carrier =
+            CarrierPartDocument { fingers: None, finger_fillet_radius_mm: None, strength: None, ..self.carrier };
+        self
     }
 }
 

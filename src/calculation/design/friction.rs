@@ -48,64 +48,57 @@ union! {
     /// Surface on which the teeth run at the wave generator.
     #[schema(as = WaveGeneratorFriction)]
     pub enum WaveGeneratorFrictionDocument by "kind" read "by:kind" {
-        /// The cam itself: the teeth slide on it.
-        Plain(CoefficientDocument),
+        /// Friction of a contact.
+        Plain {
+            /// Coefficient of friction μ, from 0 to 1.
+            coefficient: f64,
+        },
         /// A race around the cam that rotates freely: a thin bearing, or the bearing that is the eccentric.
-        Race(RaceDocument),
-        /// A race that is at rest relative to the carrier and does not slide on the teeth: the limit of a light
-        /// bearing.
-        Rolling(RollingDocument),
+        Race {
+            /// Coefficient of friction μ between teeth and race, from 0 to 1.
+            coefficient: f64,
+            /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
+            bearing_coefficient: f64,
+            /// Radius R_b for the bearing's coefficient of friction, in mm.
+            bearing_radius_mm: f64,
+            /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
+            /// circle. Default: no life is calculated.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            bearing_load_rating_n: Option<f64>,
+            /// Rolling element of the bearing. Default: ball.
+            #[serde(default)]
+            bearing_element: RollingElement,
+        },
+        /// A race that is at rest relative to the carrier and does not slide on the teeth: the limit of a light bearing.
+        Rolling {
+            /// Allowed as for `race`, but without effect: such a race does not slide on the teeth.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            coefficient: Option<f64>,
+            /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
+            bearing_coefficient: f64,
+            /// Radius R_b for the bearing's coefficient of friction, in mm.
+            bearing_radius_mm: f64,
+            /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
+            /// circle. Default: no life is calculated.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            bearing_load_rating_n: Option<f64>,
+            /// Rolling element of the bearing. Default: ball.
+            #[serde(default)]
+            bearing_element: RollingElement,
+        },
     }
 }
 
-/// A race around the cam that rotates freely: a thin bearing, or the bearing that is the eccentric.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
-pub struct RaceDocument {
-    /// Coefficient of friction μ between teeth and race, from 0 to 1.
-    pub coefficient: f64,
-    /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
-    pub bearing_coefficient: f64,
-    /// Radius R_b for the bearing's coefficient of friction, in mm.
-    pub bearing_radius_mm: f64,
-    /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
-    /// circle. Default: no life is calculated.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bearing_load_rating_n: Option<f64>,
-    /// Rolling element of the bearing. Default: ball.
-    #[serde(default)]
-    pub bearing_element: RollingElement,
-}
-
-/// A race that is at rest relative to the carrier and does not slide on the teeth: the limit of a light bearing.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object")]
-pub struct RollingDocument {
-    /// Allowed as for `race`, but without effect: such a race does not slide on the teeth.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub coefficient: Option<f64>,
-    /// Coefficient of friction μ_b of the bearing, from 0 to 1: friction torque over load times `bearing_radius_mm`.
-    pub bearing_coefficient: f64,
-    /// Radius R_b for the bearing's coefficient of friction, in mm.
-    pub bearing_radius_mm: f64,
-    /// Dynamic load rating C of the bearing, in N, for its life by ISO 281. Only for the bearing of an eccentric
-    /// circle. Default: no life is calculated.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bearing_load_rating_n: Option<f64>,
-    /// Rolling element of the bearing. Default: ball.
-    #[serde(default)]
-    pub bearing_element: RollingElement,
-}
-
 impl FrictionDocument {
-    /// Returns the parameters of the losses. Fails also if a bearing has a rating and the wave generator is no
-    /// eccentric circle.
-    pub(super) fn loss_parameters(&self, is_eccentric: bool) -> Result<LossParameters, Vec<Violation>> {
+    /// Returns the parameters of the losses, and adds their violations: also if a bearing has a rating and the wave
+    /// generator is no eccentric circle.
+    pub(super) fn loss_parameters(
+        &self,
+        is_eccentric: bool,
+        violations: &mut Vec<Violation>,
+    ) -> Option<LossParameters> {
         let (wear_rate_mm3_per_nm, bearing) = (self.wear_rate_mm3_per_nm(), self.bearing_rating());
-        let mut violations = Vec::new();
-        if let WaveGeneratorFrictionDocument::Rolling(RollingDocument { coefficient: Some(unused), .. }) =
-            self.wave_generator
-        {
+        if let WaveGeneratorFrictionDocument::Rolling { coefficient: Some(unused), .. } = self.wave_generator {
             violations.extend(Parameter::FrictionCoefficient(Contact::WaveGenerator).check(unused));
         }
         for (contact, &rate) in wear_rate_mm3_per_nm.iter().flat_map(PerContact::iter) {
@@ -120,18 +113,8 @@ impl FrictionDocument {
                 ));
             }
         }
-        match Friction::new(&self.into()) {
-            Ok(friction) if violations.is_empty() => Ok(LossParameters { friction, wear_rate_mm3_per_nm, bearing }),
-            friction => {
-                violations.extend(friction.err().into_iter().flatten());
-                Err(violations)
-            }
-        }
-    }
-
-    /// Removes wear rates that are all zero, as by default.
-    pub(super) fn leave_out_zero_wear(&mut self) {
-        self.wear_rate_mm3_per_nm.take_if(|rates| *rates == WearRatesDocument::default());
+        let friction = Friction::new(&self.into()).map_err(|found| violations.extend(found)).ok()?;
+        Some(LossParameters { friction, wear_rate_mm3_per_nm, bearing })
     }
 
     /// The wear rates, where there are any.
@@ -142,29 +125,29 @@ impl FrictionDocument {
 
     /// Returns the data for the life of the bearing, if a load rating is given.
     fn bearing_rating(&self) -> Option<BearingRating> {
-        let (rating_n, element) = match &self.wave_generator {
-            WaveGeneratorFrictionDocument::Plain(_) => return None,
-            WaveGeneratorFrictionDocument::Race(race) => (race.bearing_load_rating_n, race.bearing_element),
-            WaveGeneratorFrictionDocument::Rolling(rolling) => (rolling.bearing_load_rating_n, rolling.bearing_element),
-        };
-        Some(BearingRating { dynamic_load_rating_n: rating_n?, element })
+        use WaveGeneratorFrictionDocument::{Plain, Race, Rolling};
+        match self.wave_generator {
+            Plain { .. } => None,
+            Race { bearing_load_rating_n, bearing_element: element, .. }
+            | Rolling { bearing_load_rating_n, bearing_element: element, .. } => {
+                Some(BearingRating { dynamic_load_rating_n: bearing_load_rating_n?, element })
+            }
+        }
     }
 }
 
 impl From<&FrictionDocument> for FrictionParameters {
     fn from(document: &FrictionDocument) -> Self {
         use WaveGeneratorFrictionDocument::{Plain, Race, Rolling};
+        let bearing = |coefficient, radius_mm| RaceBearing { coefficient, radius_mm };
         let wave_generator = match document.wave_generator {
-            Plain(CoefficientDocument { coefficient }) => WaveGeneratorFriction::Plain { coefficient },
-            Race(RaceDocument { coefficient, bearing_coefficient, bearing_radius_mm, .. }) => {
-                WaveGeneratorFriction::Race {
-                    coefficient,
-                    bearing: RaceBearing { coefficient: bearing_coefficient, radius_mm: bearing_radius_mm },
-                }
+            Plain { coefficient } => WaveGeneratorFriction::Plain { coefficient },
+            Race { coefficient, bearing_coefficient, bearing_radius_mm, .. } => {
+                WaveGeneratorFriction::Race { coefficient, bearing: bearing(bearing_coefficient, bearing_radius_mm) }
             }
-            Rolling(RollingDocument { bearing_coefficient, bearing_radius_mm, .. }) => WaveGeneratorFriction::Rolling {
-                bearing: RaceBearing { coefficient: bearing_coefficient, radius_mm: bearing_radius_mm },
-            },
+            Rolling { bearing_coefficient, bearing_radius_mm, .. } => {
+                WaveGeneratorFriction::Rolling { bearing: bearing(bearing_coefficient, bearing_radius_mm) }
+            }
         };
         Self {
             wave_generator,

@@ -8,8 +8,6 @@ use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema,
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
-use crate::json::ANY;
-
 /// A set of refinements. Needs `virtual_work`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Refinements {
@@ -107,10 +105,6 @@ impl<'de> Deserialize<'de> for RefinementsDocument {
                 write!(f, "`{AUTO}`, `{NONE}` or a list of refinements")
             }
 
-            fn visit_newtype_struct<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
-                deserializer.deserialize_any(self)
-            }
-
             fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Self::Value, E> {
                 match word {
                     AUTO => Ok(RefinementsDocument::AUTO),
@@ -128,7 +122,7 @@ impl<'de> Deserialize<'de> for RefinementsDocument {
             }
         }
 
-        deserializer.deserialize_newtype_struct(ANY, WordOrList)
+        deserializer.deserialize_any(WordOrList)
     }
 }
 

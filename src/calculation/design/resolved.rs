@@ -6,10 +6,10 @@ use toothwave_solver::violation::Modified;
 use toothwave_solver::{Compatibility, Modification, Parameter, Part, PerContact, Violation, model_error};
 
 use super::{
-    ClearanceDocument, Design, DriveDocument, HertzDocument, JohnsonDocument, LinearDocument, ModelDocument,
-    Refinements, RefinementsDocument, StiffnessDocument, TeethDocument,
+    ClearanceDocument, Design, ModelDocument, Refinements, RefinementsDocument, StiffnessDocument, StrengthDocument,
+    TeethDocument,
 };
-use crate::json::Fault;
+use crate::field::FieldError;
 
 /// Relative difference of a gap and a sum of clearances that is due to rounding.
 const ROUNDING: f64 = 1e-12;
@@ -96,7 +96,7 @@ impl Design {
     }
 
     /// Checks that `model.clearance` and `parts` do not give a contact different gaps.
-    pub fn require_one_clearance(&self) -> Result<(), Fault> {
+    pub fn require_one_clearance(&self) -> Result<(), FieldError> {
         let of_parts = self.clearances_of_parts_um().gaps();
         for (contact, &gap_um) in self.deprecated_gaps_um().iter() {
             let of_parts = *of_parts.get(contact);
@@ -105,14 +105,14 @@ impl Design {
                 let detail = format!(
                     "the gap is {gap_um:?} µm here, and {of_parts:?} µm by `parts.{contact}.clearance_um` and `parts.teeth.clearance_um`; leave out `model.clearance`, which is deprecated"
                 );
-                return Err(Fault::conflict(&Parameter::Clearance(contact).to_string(), detail));
+                return Err(FieldError::conflict(&Parameter::Clearance(contact).to_string(), detail));
             }
         }
         Ok(())
     }
 
     /// Checks that deprecated switches do not conflict with `refinements` or `projection`.
-    pub fn require_one_choice_of_refinements(&self) -> Result<(), Fault> {
+    pub fn require_one_choice_of_refinements(&self) -> Result<(), FieldError> {
         let is_projection = self.model.compatibility == Compatibility::Projection;
         let is_chosen = self.model.refinements != RefinementsDocument::AUTO;
         for (pointer, is_on) in self.model.switches() {
@@ -123,7 +123,7 @@ impl Design {
                 Some(true) if is_projection => "`projection` takes no refinement; choose `virtual_work`",
                 _ => continue,
             };
-            return Err(Fault::conflict(pointer, detail));
+            return Err(FieldError::conflict(pointer, detail));
         }
         Ok(())
     }
@@ -146,7 +146,7 @@ impl Design {
     /// Returns the choice of `auto` under virtual work. Refinements of balls and flat-sided teeth were not checked
     /// against elastic bodies.
     fn refinements_by_geometry(&self, has_pointed_tips: bool) -> Refinements {
-        let is_refined = has_pointed_tips && matches!(self.drive.teeth, TeethDocument::Cylinder(_));
+        let is_refined = has_pointed_tips && matches!(self.drive.teeth, TeethDocument::Cylinder { .. });
         Refinements {
             ring_teeth_bend: is_refined,
             wave_generator_moves: is_refined && self.has_gaps(),
@@ -189,9 +189,9 @@ impl Design {
     /// paper's compatibility.
     pub fn stiffness(&self) -> StiffnessDocument {
         let by_default = || match (&self.drive.teeth, self.model.compatibility) {
-            (TeethDocument::Ball(_), _) => StiffnessDocument::Hertz(HertzDocument::default()),
-            (_, Compatibility::Projection) => StiffnessDocument::Linear(LinearDocument::default()),
-            (_, Compatibility::VirtualWork) => StiffnessDocument::Johnson(JohnsonDocument::default()),
+            (TeethDocument::Ball { .. }, _) => StiffnessDocument::Hertz {},
+            (_, Compatibility::Projection) => StiffnessDocument::Linear {},
+            (_, Compatibility::VirtualWork) => StiffnessDocument::Johnson { depth_mm: Default::default() },
         };
         let mut stiffness = self.model.stiffness.clone().unwrap_or_else(by_default);
         stiffness.fill_in(self.drive.teeth.counted().radius_mm);
@@ -205,7 +205,7 @@ impl Design {
             stiffness: Some(self.stiffness()),
             series_compliance_mm_per_n: self.model.series_compliance_mm_per_n.clone(),
             refinements: RefinementsDocument::only(self.refinements(has_pointed_tips)),
-            clearance: self.clearance_in_key().cloned(),
+            clearance: self.effective_clearance(),
             ..ModelDocument::default()
         }
     }
@@ -214,7 +214,7 @@ impl Design {
     /// geometry.
     pub fn with_defaults(mut self) -> Self {
         self.model.stiffness = Some(self.stiffness());
-        self.model.clearance = self.clearance_in_key().cloned();
+        self.model.clearance = self.effective_clearance();
         self.drive.teeth.install_all_by_default();
         self
     }
@@ -222,50 +222,36 @@ impl Design {
     /// Returns the document in one of several spellings with the same meaning: strengths as numbers and, if the drive is
     /// that of every variant, `auto` for the refinements that it means.
     pub fn in_one_spelling(mut self, is_only_drive: bool) -> Self {
-        self.parts = self.parts.under_load();
-        if is_only_drive {
-            self.model.refinements = self.model_in_key().refinements;
+        let strength = self.parts.carrier.strength;
+        self.parts.carrier.strength = strength.map(|strength| StrengthDocument::Given(strength.numbers()));
+        // Deprecated switches are kept, because answers name them.
+        let has_switch = self.model.switches().any(|(_, is_on)| is_on.is_some());
+        // Only refinements other than `auto` depend on the geometry.
+        if is_only_drive && !has_switch && self.model.refinements != RefinementsDocument::AUTO {
+            let drive = Draft::new(&self.drive_parameters()).ok().and_then(|draft| draft.drive());
+            let has_pointed_tips = drive.is_some_and(|drive| model_error::has_pointed_tips(&drive));
+            let refinements = self.refinements(has_pointed_tips);
+            let is_auto = refinements == self.refinements_of(RefinementsDocument::AUTO, has_pointed_tips);
+            self.model.refinements =
+                if is_auto { RefinementsDocument::AUTO } else { RefinementsDocument::only(refinements) };
         }
         self
     }
 
-    /// Returns the drive for keys. The document keeps a left-out `installed`, so that no error refers to it.
-    pub(crate) fn drive_in_key(&self) -> DriveDocument {
-        let mut drive = self.drive.clone();
-        drive.teeth.install_all_by_default();
-        drive
+    /// Returns the document for keys. A default that is written out gives the same key as one that is left out.
+    pub(crate) fn in_key(&self) -> Self {
+        self.clone().with_defaults().in_one_spelling(true)
     }
 
     /// Returns what a drawing reads, for keys.
-    pub(crate) fn drawn_in_key(&self) -> impl Serialize + '_ {
-        let chord_tolerance_mm = self.profile.chord_tolerance_mm;
-        let parts = (self.parts.as_drawn(), self.clearance_in_key());
-        (self.drive_in_key(), parts, &self.modification, chord_tolerance_mm)
+    pub(crate) fn drawn_in_key(&self) -> impl Serialize + use<> {
+        let Self { drive, parts, model, modification, profile, .. } = self.in_key();
+        (drive, (parts.drawn(), model.clearance), modification, profile.chord_tolerance_mm)
     }
 
     /// Returns `model.clearance` if it has an effect.
-    fn clearance_in_key(&self) -> Option<&ClearanceDocument> {
-        self.model.clearance.as_ref().filter(|_| self.deprecated_gaps_um() != PerContact::default())
-    }
-
-    /// Returns the model for keys. A default that is written out gives the same key as one that is left out. Deprecated
-    /// fields are kept, because answers name them.
-    pub(crate) fn model_in_key(&self) -> ModelDocument {
-        let mut model = self.model.clone();
-        model.stiffness = Some(self.stiffness());
-        model.clearance = self.clearance_in_key().cloned();
-        let has_switch = model.switches().any(|(_, is_on)| is_on.is_some());
-        // Only refinements other than `auto` depend on the geometry.
-        if model.refinements != RefinementsDocument::AUTO && !has_switch {
-            let drive = Draft::new(&self.drive_parameters()).ok().and_then(|draft| draft.drive());
-            let has_pointed_tips = drive.is_some_and(|drive| model_error::has_pointed_tips(&drive));
-            let of = |asked| self.refinements_of(asked, has_pointed_tips);
-            let refinements = of(model.refinements);
-            let is_auto = refinements == of(RefinementsDocument::AUTO);
-            model.refinements =
-                if is_auto { RefinementsDocument::AUTO } else { RefinementsDocument::only(refinements) };
-        }
-        model
+    fn effective_clearance(&self) -> Option<ClearanceDocument> {
+        self.model.clearance.clone().filter(|_| self.deprecated_gaps_um() != PerContact::default())
     }
 }
 

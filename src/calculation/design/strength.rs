@@ -1,5 +1,7 @@
 //! Strength of the carrier's material: a name, or numbers.
 
+use std::sync::LazyLock;
+
 use serde::{Serialize, Serializer};
 use toothwave_solver::fingers::Strength;
 use utoipa::openapi::schema::{ObjectBuilder, Type};
@@ -17,7 +19,6 @@ pub enum StrengthDocument {
 }
 
 impl StrengthDocument {
-    /// Returns the numbers.
     pub(super) const fn numbers(self) -> Strength {
         match self {
             Self::Named(preset) => Strength {
@@ -40,25 +41,16 @@ impl Serialize for StrengthDocument {
     }
 }
 
-/// Names of all strengths.
-const NAMES: [&str; STRENGTHS.len()] = {
-    let mut names = [""; STRENGTHS.len()];
-    let mut at = 0;
-    while at < names.len() {
-        names[at] = STRENGTHS[at].name;
-        at += 1;
-    }
-    names
-};
+static NAMES: LazyLock<[&str; STRENGTHS.len()]> = LazyLock::new(|| STRENGTHS.map(|preset| preset.name));
 
 either! {
     StrengthDocument as "Strength" (
         "Strength of the carrier's material: a name from `GET /v1/materials`, or numbers.",
-        ObjectBuilder::new().schema_type(Type::String).enum_values(Some(NAMES))
+        ObjectBuilder::new().schema_type(Type::String).enum_values(Some(*NAMES))
     ) expects "the name of a material, or an object with its strength":
     visit_str(name: &str) => {
         let preset = STRENGTHS.iter().find(|preset| preset.name == name);
-        preset.map(Self::Value::Named).ok_or_else(|| E::unknown_variant(name, &NAMES))
+        preset.map(Self::Value::Named).ok_or_else(|| E::unknown_variant(name, &*NAMES))
     },
     Strength => StrengthDocument::Given,
 }

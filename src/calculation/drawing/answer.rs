@@ -207,22 +207,24 @@ impl OutlineAnswer {
 }
 
 impl EdgeAnswer {
+    /// Returns x and y of the points, which are on the edge, from start to end.
+    pub fn points(&self) -> impl DoubleEndedIterator<Item = [f64; 2]> + ExactSizeIterator {
+        let (x_mm, y_mm) = match self {
+            Self::Line { x_mm, y_mm } => (&x_mm[..], &y_mm[..]),
+            Self::Arc { x_mm, y_mm, .. } => (&x_mm[..], &y_mm[..]),
+            Self::Curve { x_mm, y_mm, .. } => (&x_mm[..], &y_mm[..]),
+        };
+        x_mm.iter().zip(y_mm).map(|(&x, &y)| [x, y])
+    }
+
     /// Returns the end point.
     pub fn end(&self) -> [f64; 2] {
-        match self {
-            Self::Line { x_mm, y_mm } => [x_mm[1], y_mm[1]],
-            Self::Arc { x_mm, y_mm, .. } => [x_mm[2], y_mm[2]],
-            Self::Curve { x_mm, y_mm, .. } => [x_mm[x_mm.len() - 1], y_mm[y_mm.len() - 1]],
-        }
+        self.points().next_back().unwrap_or_default()
     }
 
     /// Returns the start point.
     pub fn start(&self) -> [f64; 2] {
-        match self {
-            Self::Line { x_mm, y_mm } => [x_mm[0], y_mm[0]],
-            Self::Arc { x_mm, y_mm, .. } => [x_mm[0], y_mm[0]],
-            Self::Curve { x_mm, y_mm, .. } => [x_mm[0], y_mm[0]],
-        }
+        self.points().next().unwrap_or_default()
     }
 }
 
@@ -262,14 +264,14 @@ impl From<Placement> for PlacementAnswer {
 }
 
 impl BodyAnswer {
-    pub(super) fn new(Body { part, section, placements, .. }: Body, drive: &Drive) -> Self {
+    pub(super) fn new(Body { part, outer, holes, placements, .. }: Body, drive: &Drive) -> Self {
         let is_ball = part == Part::Teeth && matches!(drive.parameters().tooth, ToothShape::Ball { .. });
         Self {
             part,
             solid: if is_ball { BodySolid::Ball } else { BodySolid::Prism },
             width_mm: drive.tooth_width_mm(),
-            outer: section.outer.into(),
-            holes: section.holes.into_iter().map(Into::into).collect(),
+            outer: outer.into(),
+            holes: holes.into_iter().map(Into::into).collect(),
             placements: placements.into_iter().map(Into::into).collect(),
         }
     }

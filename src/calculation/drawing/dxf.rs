@@ -32,7 +32,6 @@ const fn layer_of(part: Part) -> (&'static str, u8) {
     }
 }
 
-/// Writes a drawing.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let mut dxf = Dxf { writer, next_handle: FIRST_FREE };
     let title = svg::title(drawing);

@@ -228,12 +228,11 @@ fn line(outline: &OutlineAnswer, tolerance_mm: f64) -> Vec<[f64; 2]> {
         OutlineAnswer::Path { edges } => edges
             .iter()
             .flat_map(|edge| match edge {
-                EdgeAnswer::Line { .. } => vec![edge.start()],
                 EdgeAnswer::Arc { center_mm, radius_mm, sweep_deg, .. } => {
-                    arc(edge.start(), *center_mm, *radius_mm, sweep_deg.to_radians()).collect()
+                    arc(edge.start(), *center_mm, *radius_mm, sweep_deg.to_radians()).collect::<Vec<_>>()
                 }
-                EdgeAnswer::Curve { x_mm, y_mm, .. } => {
-                    x_mm.iter().zip(y_mm).take(x_mm.len() - 1).map(|(&x, &y)| [x, y]).collect()
+                EdgeAnswer::Line { .. } | EdgeAnswer::Curve { .. } => {
+                    edge.points().take(edge.points().len() - 1).collect()
                 }
             })
             .collect(),

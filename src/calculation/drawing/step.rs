@@ -17,7 +17,6 @@ use crate::json;
 /// Digits of the design's hash in the names of parts: enough to distinguish designs, few enough to read in a tree view.
 const HASH_DIGITS: usize = 8;
 
-/// Writes a drawing.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let mut step = Step { writer, last: FRAME_RECORDS, shared: HashMap::new() };
     step.head(drawing)?;
@@ -65,27 +64,21 @@ const DEFINITION_CONTEXT: Id = Id(4);
 const UNITS: Id = Id(9);
 
 /// Edge of the bottom of a prism: counter-clockwise around the material, which is on its left.
-enum Side {
-    Line {
-        end: [f64; 2],
-    },
+struct Side {
+    start: [f64; 2],
+    end: [f64; 2],
+    shape: Shape,
+}
+
+enum Shape {
+    Line,
     Arc {
-        end: [f64; 2],
         center: [f64; 2],
         radius_mm: f64,
         is_counter_clockwise: bool,
     },
-    /// Along a polynomial, by its Bézier control polygon.
+    /// A polynomial, by its Bézier control polygon.
     Curve(Vec<[f64; 2]>),
-}
-
-impl Side {
-    fn end(&self) -> [f64; 2] {
-        match self {
-            Self::Line { end } | Self::Arc { end, .. } => *end,
-            Self::Curve(poles) => poles.last().copied().unwrap_or_default(),
-        }
-    }
 }
 
 /// Corners and edges of one loop at one height.
@@ -267,8 +260,7 @@ impl Step<'_> {
     /// Writes the corners of a loop at a height, and the edges between them.
     fn level(&mut self, sides: &[Side], z_mm: f64) -> io::Result<Level> {
         let mut corners = Vec::new();
-        for side in sides {
-            let [x, y] = side.end();
+        for &Side { end: [x, y], .. } in sides {
             let point = self.point([x, y, z_mm])?;
             corners.push(self.record(format_args!("VERTEX_POINT('',{point})"))?);
         }
@@ -276,8 +268,7 @@ impl Step<'_> {
         corners.rotate_right(1);
         let (mut edges, mut curves) = (Vec::new(), Vec::new());
         for (index, side) in sides.iter().enumerate() {
-            let start = sides[(index + sides.len() - 1) % sides.len()].end();
-            let (curve, runs_along) = self.curve(side, start, z_mm)?;
+            let (curve, runs_along) = self.curve(side, z_mm)?;
             curves.push(curve);
             let (from, to) = (corners[index], corners[(index + 1) % corners.len()]);
             edges.push(self.record(format_args!("EDGE_CURVE('',{from},{to},{curve},{runs_along})"))?);
@@ -286,19 +277,19 @@ impl Step<'_> {
     }
 
     /// Writes the curve under an edge. Returns it and `.T.` if the edge has the same direction.
-    fn curve(&mut self, side: &Side, start: [f64; 2], z_mm: f64) -> io::Result<(Id, &'static str)> {
-        match side {
-            Side::Line { end } => {
+    fn curve(&mut self, Side { start, end, shape }: &Side, z_mm: f64) -> io::Result<(Id, &'static str)> {
+        match shape {
+            Shape::Line => {
                 let point = self.point([start[0], start[1], z_mm])?;
-                let [x, y] = unit([end[0] - start[0], end[1] - start[1]]);
+                let [x, y] = direction(*start, *end);
                 Ok((self.line(point, [x, y, 0.0])?, ".T."))
             }
-            Side::Arc { center: [x, y], radius_mm, is_counter_clockwise, .. } => {
+            Shape::Arc { center: [x, y], radius_mm, is_counter_clockwise } => {
                 let place = self.placement([*x, *y, z_mm], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
                 let circle = self.record(format_args!("CIRCLE('',{place},{})", Real(*radius_mm)))?;
                 Ok((circle, if *is_counter_clockwise { ".T." } else { ".F." }))
             }
-            Side::Curve(poles) => {
+            Shape::Curve(poles) => {
                 let poles: Vec<_> = poles.iter().map(|[x, y]| self.point([*x, *y, z_mm])).collect::<Result<_, _>>()?;
                 let order = poles.len();
                 let spline = self.record(format_args!(
@@ -314,20 +305,17 @@ impl Step<'_> {
     /// Writes the faces on the edges of a loop. Seen from outside, each runs along the bottom, up, back and down.
     fn walls(&mut self, sides: &[Side], bottom: &Level, top: &Level) -> io::Result<Vec<Id>> {
         let mut uprights = Vec::new();
-        for (index, (&from, &to)) in bottom.corners.iter().zip(&top.corners).enumerate() {
-            let [x, y] = sides[(index + sides.len() - 1) % sides.len()].end();
-            let point = self.point([x, y, 0.0])?;
+        for (side, (&from, &to)) in sides.iter().zip(bottom.corners.iter().zip(&top.corners)) {
+            let point = self.point([side.start[0], side.start[1], 0.0])?;
             let line = self.line(point, [0.0, 0.0, 1.0])?;
             uprights.push(self.record(format_args!("EDGE_CURVE('',{from},{to},{line},.T.)"))?);
         }
         let mut faces = Vec::new();
         for (index, side) in sides.iter().enumerate() {
-            let start = sides[(index + sides.len() - 1) % sides.len()].end();
-            let (surface, faces_outward) = self.surface(side, start, bottom.curves[index])?;
-            let next = (index + 1) % sides.len();
+            let (surface, faces_outward) = self.surface(side, bottom.curves[index])?;
             let around = self.edge_loop([
                 (bottom.edges[index], true),
-                (uprights[next], true),
+                (uprights[(index + 1) % sides.len()], true),
                 (top.edges[index], false),
                 (uprights[index], false),
             ])?;
@@ -339,20 +327,20 @@ impl Step<'_> {
 
     /// Writes the surface over an edge of the bottom. Returns it and `.T.` if its normal points out of the material, to
     /// the right of the edge.
-    fn surface(&mut self, side: &Side, start: [f64; 2], curve: Id) -> io::Result<(Id, &'static str)> {
-        match side {
-            Side::Line { end } => {
-                let [x, y] = unit([end[0] - start[0], end[1] - start[1]]);
+    fn surface(&mut self, Side { start, end, shape }: &Side, curve: Id) -> io::Result<(Id, &'static str)> {
+        match shape {
+            Shape::Line => {
+                let [x, y] = direction(*start, *end);
                 let place = self.placement([start[0], start[1], 0.0], [y, -x, 0.0], [x, y, 0.0])?;
                 Ok((self.record(format_args!("PLANE('',{place})"))?, ".T."))
             }
-            Side::Arc { center: [x, y], radius_mm, is_counter_clockwise, .. } => {
+            Shape::Arc { center: [x, y], radius_mm, is_counter_clockwise } => {
                 let place = self.placement([*x, *y, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])?;
                 let cylinder = self.record(format_args!("CYLINDRICAL_SURFACE('',{place},{})", Real(*radius_mm)))?;
                 // A cylinder's normal points away from its axis.
                 Ok((cylinder, if *is_counter_clockwise { ".T." } else { ".F." }))
             }
-            Side::Curve(_) => {
+            Shape::Curve(_) => {
                 let sweep = self.vector([0.0, 0.0, 1.0])?;
                 // The normal is the curve's direction times z.
                 Ok((self.record(format_args!("SURFACE_OF_LINEAR_EXTRUSION('',{curve},{sweep})"))?, ".T."))
@@ -398,44 +386,41 @@ impl Step<'_> {
 
 /// Returns the sides of a prism over an outline. Those of a hole run clockwise, so the material is on their left too.
 fn sides(outline: &OutlineAnswer, is_hole: bool) -> Vec<Side> {
-    let mut sides: Vec<_> = match outline {
+    let arc = |center, radius_mm, runs_forward| {
+        let is_counter_clockwise = runs_forward != is_hole;
+        Shape::Arc { center, radius_mm, is_counter_clockwise }
+    };
+    let curve = |poles: &Vec<[f64; 2]>| {
+        let poles = if is_hole { poles.iter().rev().copied().collect() } else { poles.clone() };
+        (poles.last().copied().unwrap_or_default(), Shape::Curve(poles))
+    };
+    let shapes: Vec<([f64; 2], Shape)> = match outline {
+        // Two halves, because some readers do not support an edge from a corner to itself. A hole has the same halves.
         OutlineAnswer::Circle { radius_mm } => {
-            let half = |x: f64| Side::Arc {
-                end: [x, 0.0],
-                center: [0.0; 2],
-                radius_mm: *radius_mm,
-                is_counter_clockwise: !is_hole,
-            };
-            // Two halves, because some readers do not support an edge from a corner to itself. A hole has the same
-            // halves.
-            return vec![half(-radius_mm), half(*radius_mm)];
+            [-radius_mm, *radius_mm].map(|x| ([x, 0.0], arc([0.0; 2], *radius_mm, true))).into()
         }
-        OutlineAnswer::Path { edges } => edges
-            .iter()
-            .flat_map(|edge| {
+        OutlineAnswer::Path { edges } => {
+            let shapes = edges.iter().flat_map(|edge| {
                 let end = if is_hole { edge.start() } else { edge.end() };
                 match edge {
-                    EdgeAnswer::Line { .. } => vec![Side::Line { end }],
+                    EdgeAnswer::Line { .. } => vec![(end, Shape::Line)],
                     EdgeAnswer::Arc { center_mm, radius_mm, sweep_deg, .. } => {
-                        let is_counter_clockwise = (*sweep_deg > 0.0) != is_hole;
-                        vec![Side::Arc { end, center: *center_mm, radius_mm: *radius_mm, is_counter_clockwise }]
+                        vec![(end, arc(*center_mm, *radius_mm, *sweep_deg > 0.0))]
                     }
-                    EdgeAnswer::Curve { polynomials, .. } if is_hole => {
-                        let back = |poles: &Vec<[f64; 2]>| Side::Curve(poles.iter().rev().copied().collect());
-                        polynomials.iter().map(back).collect()
-                    }
-                    EdgeAnswer::Curve { polynomials, .. } => polynomials.iter().cloned().map(Side::Curve).collect(),
+                    EdgeAnswer::Curve { polynomials, .. } => polynomials.iter().map(curve).collect(),
                 }
-            })
-            .collect(),
+            });
+            if is_hole { shapes.rev().collect() } else { shapes.collect() }
+        }
     };
-    if is_hole {
-        sides.reverse();
-    }
-    sides
+    let ends: Vec<_> = shapes.iter().map(|(end, _)| *end).collect();
+    let starts = ends.last().into_iter().chain(&ends);
+    starts.zip(shapes).map(|(&start, (end, shape))| Side { start, end, shape }).collect()
 }
 
-fn unit([x, y]: [f64; 2]) -> [f64; 2] {
+/// Returns the unit vector from one point towards another.
+fn direction(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
+    let [x, y] = [to[0] - from[0], to[1] - from[1]];
     let length = x.hypot(y);
     [x / length, y / length]
 }

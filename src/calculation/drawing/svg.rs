@@ -9,7 +9,6 @@ use super::answer::{BodyAnswer, DrawingAnswer, EdgeAnswer, OutlineAnswer, Placem
 /// Margin around the drawing, as a share of the picture.
 const MARGIN: f64 = 0.03;
 
-/// Writes a drawing.
 pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let reach_mm = reach_mm(&drawing.bodies) * (1.0 + MARGIN);
     let size_mm = 2.0 * reach_mm;
@@ -52,9 +51,10 @@ pub(super) fn title(drawing: &DrawingAnswer) -> String {
 /// Returns the largest distance of a drawing's points from its origin.
 pub(super) fn reach_mm(bodies: &[BodyAnswer]) -> f64 {
     let of_edge = |edge: &EdgeAnswer| match edge {
-        EdgeAnswer::Line { x_mm, y_mm } => farthest(x_mm, y_mm),
         EdgeAnswer::Arc { center_mm: [x, y], radius_mm, .. } => x.hypot(*y) + radius_mm,
-        EdgeAnswer::Curve { x_mm, y_mm, .. } => farthest(x_mm, y_mm),
+        EdgeAnswer::Line { .. } | EdgeAnswer::Curve { .. } => {
+            edge.points().map(|[x, y]| x.hypot(y)).fold(0.0, f64::max)
+        }
     };
     let of_body = |body: &BodyAnswer| {
         let outline_mm = match &body.outer {
@@ -64,10 +64,6 @@ pub(super) fn reach_mm(bodies: &[BodyAnswer]) -> f64 {
         body.placements.iter().map(|placement| placement.x_mm.hypot(placement.y_mm) + outline_mm).fold(0.0, f64::max)
     };
     bodies.iter().map(of_body).fold(0.0, f64::max)
-}
-
-fn farthest(x_mm: &[f64], y_mm: &[f64]) -> f64 {
-    x_mm.iter().zip(y_mm).map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max)
 }
 
 fn write_outline(outline: &OutlineAnswer, placement: &PlacementAnswer, writer: &mut dyn Write) -> io::Result<()> {
@@ -86,19 +82,14 @@ fn write_outline(outline: &OutlineAnswer, placement: &PlacementAnswer, writer: &
                     write!(writer, "M{x} {y}")?;
                 }
                 match edge {
-                    EdgeAnswer::Line { x_mm, y_mm } => {
-                        let [x, y] = place([x_mm[1], y_mm[1]]);
-                        write!(writer, "L{x} {y}")?;
-                    }
-                    EdgeAnswer::Arc { x_mm, y_mm, radius_mm, sweep_deg, .. } => {
-                        let [x, y] = place([x_mm[2], y_mm[2]]);
+                    EdgeAnswer::Arc { radius_mm, sweep_deg, .. } => {
+                        let [x, y] = place(edge.end());
                         let (large, counter_clockwise) =
                             (u8::from(sweep_deg.abs() > 180.0), u8::from(*sweep_deg > 0.0));
                         write!(writer, "A{radius_mm} {radius_mm} 0 {large} {counter_clockwise} {x} {y}")?;
                     }
-                    EdgeAnswer::Curve { x_mm, y_mm, .. } => {
-                        for (&x, &y) in x_mm.iter().zip(y_mm).skip(1) {
-                            let [x, y] = place([x, y]);
+                    EdgeAnswer::Line { .. } | EdgeAnswer::Curve { .. } => {
+                        for [x, y] in edge.points().skip(1).map(&place) {
                             write!(writer, "L{x} {y}")?;
                         }
                     }

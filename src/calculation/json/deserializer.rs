@@ -2,9 +2,9 @@
 
 use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
 
-use super::fault::{Fault, escaped};
-use super::tree::{ANY, Tree};
-use crate::field::FieldCode;
+use super::escaped;
+use super::tree::Tree;
+use crate::field::{FieldCode, FieldError};
 
 impl Tree {
     /// Returns what stands here, for a message.
@@ -21,28 +21,27 @@ impl Tree {
 }
 
 impl<'de> serde::Deserializer<'de> for &Tree {
-    type Error = Fault;
+    type Error = FieldError;
 
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, FieldError> {
         match self {
             Tree::Null => visitor.visit_unit(),
             Tree::Bool(value) => visitor.visit_bool(*value),
             Tree::Number(value) => visitor.visit_f64(*value),
             Tree::Text(value) => visitor.visit_str(value),
             Tree::Object(fields) => visitor.visit_map(Fields::new(fields, None)),
-            // A type that is read field by field would accept an array as its fields in order.
-            Tree::Array(_) => Err(de::Error::invalid_type(self.unexpected(), &visitor)),
+            Tree::Array(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
         }
     }
 
     /// A field may be left out but not be null, except with `or_null`.
-    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, FieldError> {
         visitor.visit_some(self)
     }
 
-    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, FieldError> {
         match self {
-            Tree::Array(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
+            Tree::Array(_) => self.deserialize_any(visitor),
             _ => Err(de::Error::invalid_type(self.unexpected(), &"an array")),
         }
     }
@@ -54,7 +53,7 @@ impl<'de> serde::Deserializer<'de> for &Tree {
         name: &'static str,
         _: &'static [&'static str],
         visitor: V,
-    ) -> Result<V::Value, Fault> {
+    ) -> Result<V::Value, FieldError> {
         match (self, name.strip_prefix("by:")) {
             (Tree::Text(value), None) => visitor.visit_enum(value.as_str().into_deserializer()),
             (Tree::Object(fields), Some(tag)) => {
@@ -66,17 +65,26 @@ impl<'de> serde::Deserializer<'de> for &Tree {
         }
     }
 
-    fn deserialize_newtype_struct<V: Visitor<'de>>(self, name: &'static str, visitor: V) -> Result<V::Value, Fault> {
+    /// A structure is an object. serde would also accept an array, as its fields in order.
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, FieldError> {
         match self {
-            Tree::Array(items) if name == ANY => visitor.visit_seq(Items { items: items.iter().enumerate() }),
-            _ if name == ANY => self.deserialize_any(visitor),
-            _ => visitor.visit_newtype_struct(self),
+            Tree::Array(_) => Err(de::Error::invalid_type(self.unexpected(), &visitor)),
+            _ => self.deserialize_any(visitor),
         }
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, FieldError> {
+        visitor.visit_newtype_struct(self)
     }
 
     serde::forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct tuple
-        tuple_struct map struct identifier ignored_any
+        tuple_struct map identifier ignored_any
     }
 }
 
@@ -94,14 +102,14 @@ impl<'a> Fields<'a> {
 }
 
 impl<'de> MapAccess<'de> for Fields<'_> {
-    type Error = Fault;
+    type Error = FieldError;
 
-    fn next_key_seed<K: de::DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Fault> {
+    fn next_key_seed<K: de::DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, FieldError> {
         self.current = self.fields.find(|(key, _)| Some(key.as_str()) != self.passed_over);
         self.current.map(|(key, _)| seed.deserialize(key.as_str().into_deserializer())).transpose()
     }
 
-    fn next_value_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Fault> {
+    fn next_value_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, FieldError> {
         let Some((key, value)) = self.current else {
             return Err(de::Error::custom("a value was read before its key"));
         };
@@ -114,9 +122,9 @@ struct Items<'a> {
 }
 
 impl<'de> de::SeqAccess<'de> for Items<'_> {
-    type Error = Fault;
+    type Error = FieldError;
 
-    fn next_element_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, Fault> {
+    fn next_element_seed<S: de::DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, FieldError> {
         let item = self.items.next();
         item.map(|(index, node)| seed.deserialize(node).map_err(|fault| fault.within(&index.to_string()))).transpose()
     }
@@ -131,15 +139,15 @@ struct Union<'a> {
 }
 
 impl<'de> de::EnumAccess<'de> for Union<'_> {
-    type Error = Fault;
+    type Error = FieldError;
     type Variant = Self;
 
-    fn variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<(S::Value, Self), Fault> {
+    fn variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<(S::Value, Self), FieldError> {
         let mut tags = self.fields.iter().filter(|(key, _)| key == self.tag).map(|(_, value)| value);
         let kind = match (tags.next(), self.by_default) {
             (Some(Tree::Text(word)), _) => word.as_str(),
             (Some(other), _) => {
-                let fault: Fault = de::Error::invalid_type(other.unexpected(), &"a word");
+                let fault: FieldError = de::Error::invalid_type(other.unexpected(), &"a word");
                 return Err(fault.within(self.tag));
             }
             (None, Some(by_default)) => by_default,
@@ -148,35 +156,41 @@ impl<'de> de::EnumAccess<'de> for Union<'_> {
         if tags.next().is_some() {
             return Err(de::Error::duplicate_field(self.tag));
         }
-        let deserializer: de::value::StrDeserializer<'_, Fault> = kind.into_deserializer();
+        let deserializer: de::value::StrDeserializer<'_, FieldError> = kind.into_deserializer();
         Ok((seed.deserialize(deserializer).map_err(|fault| fault.within(self.tag))?, self))
     }
 }
 
-impl<'de> de::VariantAccess<'de> for Union<'_> {
-    type Error = Fault;
-
-    fn newtype_variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, Fault> {
+impl Union<'_> {
+    /// Reads the fields of the kind, without its word.
+    fn read<T>(self, read: impl FnOnce(Fields<'_>) -> Result<T, FieldError>) -> Result<T, FieldError> {
+        let has_field = |pointer: &str| self.fields.iter().any(|(key, _)| pointer == format!("/{}", escaped(key)));
         let is_named = self.fields.iter().any(|(key, _)| key == self.tag);
-        let fields = Fields::new(self.fields, Some(self.tag));
-        seed.deserialize(de::value::MapAccessDeserializer::new(fields)).map_err(|mut fault| {
-            let is_own = self.fields.iter().any(|(key, _)| fault.pointer == format!("/{}", escaped(key)));
-            if fault.code == FieldCode::UnknownField && is_own && !is_named {
+        read(Fields::new(self.fields, Some(self.tag))).map_err(|mut fault| {
+            if fault.code == FieldCode::UnknownField && !is_named && has_field(&fault.pointer) {
                 fault.detail = format!("{}. Or add the `{}` that has it", fault.detail, self.tag);
             }
             fault
         })
     }
+}
 
-    fn unit_variant(self) -> Result<(), Fault> {
+impl<'de> de::VariantAccess<'de> for Union<'_> {
+    type Error = FieldError;
+
+    fn newtype_variant_seed<S: de::DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, FieldError> {
+        self.read(|fields| seed.deserialize(de::value::MapAccessDeserializer::new(fields)))
+    }
+
+    fn unit_variant(self) -> Result<(), FieldError> {
         Err(de::Error::invalid_type(Unexpected::Map, &"a word"))
     }
 
-    fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, Fault> {
+    fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, FieldError> {
         Err(de::Error::invalid_type(Unexpected::Map, &visitor))
     }
 
-    fn struct_variant<V: Visitor<'de>>(self, _: &'static [&'static str], visitor: V) -> Result<V::Value, Fault> {
-        visitor.visit_map(Fields::new(self.fields, Some(self.tag)))
+    fn struct_variant<V: Visitor<'de>>(self, _: &'static [&'static str], visitor: V) -> Result<V::Value, FieldError> {
+        self.read(|fields| visitor.visit_map(fields))
     }
 }

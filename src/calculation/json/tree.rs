@@ -3,10 +3,11 @@
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Serialize, de};
 
-use super::fault::Fault;
+use crate::field::FieldError;
 
 /// A JSON value, parsed or constructed. Documents are read from it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Tree {
     /// `null`.
     Null,
@@ -19,7 +20,7 @@ pub enum Tree {
     /// An array.
     Array(Vec<Self>),
     /// An object with its fields in order.
-    Object(Vec<(String, Self)>),
+    Object(#[serde(serialize_with = "as_map")] Vec<(String, Self)>),
 }
 
 /// Returns the index that a name means. RFC 6901 forbids signs and leading zeros, so each item has one name.
@@ -28,17 +29,8 @@ fn item(name: &str) -> Option<usize> {
     if is_digits && (name == "0" || !name.starts_with('0')) { name.parse().ok() } else { None }
 }
 
-impl Serialize for Tree {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Null => serializer.serialize_unit(),
-            Self::Bool(value) => serializer.serialize_bool(*value),
-            Self::Number(value) => serializer.serialize_f64(*value),
-            Self::Text(value) => serializer.serialize_str(value),
-            Self::Array(items) => serializer.collect_seq(items),
-            Self::Object(fields) => serializer.collect_map(fields.iter().map(|(name, value)| (name, value))),
-        }
-    }
+fn as_map<S: serde::Serializer>(fields: &[(String, Tree)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(fields.iter().map(|(name, value)| (name, value)))
 }
 
 /// Bytes of a field name in addition to its letters: the string and its allocation.
@@ -56,12 +48,9 @@ pub fn path(pointer: &str) -> Option<Vec<String>> {
     Some(names.map(|name| name.replace("~1", "/").replace("~0", "~")).collect())
 }
 
-/// Name of a newtype for which a tree also accepts arrays.
-pub(crate) const ANY: &str = "any tree";
-
 impl<'de> Deserialize<'de> for Tree {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_newtype_struct(ANY, TreeVisitor)
+        deserializer.deserialize_any(TreeVisitor)
     }
 }
 
@@ -69,11 +58,6 @@ struct TreeVisitor;
 
 impl<'de> Visitor<'de> for TreeVisitor {
     type Value = Tree;
-
-    /// Other formats pass their newtypes here.
-    fn visit_newtype_struct<D: serde::Deserializer<'de>>(self, deserializer: D) -> Result<Tree, D::Error> {
-        deserializer.deserialize_any(self)
-    }
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("JSON")
@@ -126,7 +110,7 @@ impl<'de> Visitor<'de> for TreeVisitor {
 
 impl Tree {
     /// Deserializes the tree.
-    pub fn read<'de, T: Deserialize<'de>>(&self) -> Result<T, Fault> {
+    pub fn read<'de, T: Deserialize<'de>>(&self) -> Result<T, FieldError> {
         T::deserialize(self)
     }
 

@@ -15,7 +15,6 @@ use utoipa::ToSchema;
 
 use crate::design::ModelDocument;
 use crate::findings::FindingAnswer;
-use crate::sweep::backlash::unless_interfering;
 use crate::sweep::duty::DutyAnswer;
 use crate::sweep::losses::LossesAnswer;
 
@@ -166,7 +165,11 @@ impl WindUpAnswer {
         let InputAngles { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad, loaded_teeth, .. } =
             sweep.input_angles.clone();
         Ok(Self {
-            backlash: unless_interfering(backlash)?,
+            backlash: match backlash {
+                // A finding reports that a tooth has no space on a lobe or in a valley.
+                Err(SolveError::Interference { .. }) => None,
+                other => Some(other?),
+            },
             transmission_error_peak_to_peak_deg: sweep.transmission_error_peak_to_peak_deg(drive),
             unloaded_transmission_error_peak_to_peak_deg: unloaded_peak_to_peak_deg,
             input_angle_deg,

@@ -1,27 +1,11 @@
 //! Strength of the carrier's fingers in the answer of a sweep.
 
-use std::io::{self, Write};
-
-use toothwave_solver::backing::Backings;
 use toothwave_solver::fingers::{CarrierFingers, FingerStress};
 use toothwave_solver::losses::duty::LossTotals;
 use toothwave_solver::sweep::{ContactPeaks, SweepPeaks, TorqueCapacity};
-use toothwave_solver::{Contact, Drive, LoadCase, PerContact, SolveError};
+use toothwave_solver::{Contact, LoadCase, PerContact, SolveError};
 
-use crate::design::Design;
-use crate::json::word;
-use crate::no_answer::NoAnswer;
 use crate::sweep::CheckedSweep;
-
-pub(super) fn write_text(stress: &FingerStress, writer: &mut dyn Write) -> io::Result<()> {
-    let support = word(&stress.fingers).replace('_', " ");
-    writeln!(writer, "\nfingers of the carrier              {support}")?;
-    writeln!(writer, "stress at their feet                {:.1} MPa", stress.stress_mpa)?;
-    if let Some((yielding, fatigue)) = stress.yield_safety.zip(stress.fatigue_safety) {
-        writeln!(writer, "safety against yield, fatigue       {yielding:.2}, {fatigue:.2}")?;
-    }
-    Ok(())
-}
 
 impl CheckedSweep {
     /// Runs a sweep whose torque capacity respects the fingers of the carrier.
@@ -68,16 +52,4 @@ impl CheckedSweep {
         }
         totals
     }
-}
-
-/// Returns the fingers of the carrier, if they are calculated.
-pub(super) fn checked(
-    design: &Design,
-    drive: &Drive,
-    backings: &Backings,
-    load: &LoadCase,
-) -> Result<Option<CarrierFingers>, NoAnswer> {
-    let parameters = design.finger_parameters().map_err(|violations| NoAnswer::impossible(&violations))?;
-    let fingers = backings.finger().map(|&beam| CarrierFingers::new(drive, beam, parameters, load.parameters()));
-    Ok(fingers.transpose().map_err(SolveError::from)?)
 }

@@ -1,17 +1,14 @@
 //! Friction losses and radial forces on the wave generator in JSON.
 
-use std::io::{self, Write};
-
 use serde::Serialize;
 use toothwave_solver::losses::bearing::BearingLife;
 pub use toothwave_solver::losses::duty::LossTotals;
-use toothwave_solver::losses::period::{self, LossByPlace};
+use toothwave_solver::losses::period;
 use toothwave_solver::losses::{Efficiencies, Fixed, Mechanism};
-use toothwave_solver::sweep::{Peak, Sweep};
+use toothwave_solver::sweep::Sweep;
 use toothwave_solver::{Contact, PerContact};
 use utoipa::ToSchema;
 
-use crate::json::word;
 use crate::no_answer::NoAnswer;
 use crate::question::require_finite;
 
@@ -95,55 +92,6 @@ fn numbers(totals: &LossTotals) -> Vec<f64> {
         numbers.extend([mean_load_n, life_million_revolutions].into_iter().chain(speed_rpm).chain(life_h));
     }
     numbers
-}
-
-/// Returns the name of a contact in words.
-fn name(contact: Contact) -> String {
-    word(&RollsAnswer::from(Some(contact))).replace('_', " ")
-}
-
-pub(super) fn write_text(totals: &LossTotals, writer: &mut dyn Write) -> io::Result<()> {
-    let percent = |share: f64| 100.0 * share;
-    let Efficiencies { ring_fixed, ring_fixed_back_driven } = totals.efficiency;
-    let locks = if totals.self_locking { " (locks itself)" } else { "" };
-    let (driven, back_driven) = (percent(ring_fixed), percent(ring_fixed_back_driven));
-    writeln!(writer, "\nefficiency             driven   from behind")?;
-    writeln!(writer, "ring fixed           {driven:>6.2} %      {back_driven:>6.2} %{locks}")?;
-    let torque_nm = totals.required_input_torque_nm;
-    writeln!(writer, "input torque with losses            {torque_nm:.6} N·m, ring fixed")?;
-    if let Some(power_w) = totals.power_loss_w {
-        writeln!(writer, "power lost, ring fixed              {power_w:.6} W")?;
-    }
-    let LossByPlace { wave_generator, ring, carrier, bearing } = totals.loss_ratio_by_place;
-    for (name, ratio) in
-        [("wave generator", wave_generator), ("ring", ring), ("carrier", carrier), ("bearing", bearing)]
-    {
-        // Without friction there is no share of the loss.
-        let share = if totals.loss_ratio > 0.0 { ratio / totals.loss_ratio } else { 0.0 };
-        writeln!(writer, "  of it at the {name:<14}         {:>6.2} %", percent(share))?;
-    }
-    for (contact, peak) in totals.pressure_velocity_mpa_m_per_s.iter().flat_map(PerContact::iter) {
-        let Peak { value, input_angle_deg, position_deg } = peak;
-        let name = name(contact);
-        writeln!(writer, "{name:<14} p·v    {value:>14.3} MPa m/s {input_angle_deg:>5.4} deg {position_deg:>9.4} deg")?;
-    }
-    for (contact, wear) in totals.wear_mm_per_hour.iter().flat_map(PerContact::iter) {
-        write!(writer, "{:<14} wear   {:>14.3e} mm/h    ", name(contact), wear.value)?;
-        match wear.input_angle_deg.zip(wear.position_deg) {
-            Some((input_angle_deg, position_deg)) => {
-                writeln!(writer, "{input_angle_deg:>5.4} deg {position_deg:>9.4} deg")?;
-            }
-            None => writeln!(writer, "all round")?,
-        }
-    }
-    if let Some(BearingLife { mean_load_n, life_million_revolutions, speed_rpm, life_h }) = totals.bearing {
-        writeln!(writer, "mean load on the bearing            {mean_load_n:.6} N")?;
-        writeln!(writer, "its life                            {life_million_revolutions:.4e} million revolutions")?;
-        if let Some((speed_rpm, life_h)) = speed_rpm.zip(life_h) {
-            writeln!(writer, "                                    {life_h:.4e} h at {speed_rpm:.6} rpm")?;
-        }
-    }
-    Ok(())
 }
 
 impl From<Option<Contact>> for RollsAnswer {

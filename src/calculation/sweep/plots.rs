@@ -44,7 +44,6 @@ struct Pass {
     pieces: Vec<Vec<Range<usize>>>,
 }
 
-/// Writes the plots.
 pub(super) fn write(sweep: &SweepAnswer, writer: &mut dyn Write) -> io::Result<()> {
     let states = &sweep.states;
     let pass = Pass::of(sweep);
@@ -133,19 +132,16 @@ impl Pass {
         let SweepAnswer { states, enters_under_load, sweep_period_deg, .. } = sweep;
         let items_deviate = sweep_period_deg.is_some();
         // States stand by input angle, then tooth; where an angle stands twice, the teeth start anew.
-        let is_new = |i: usize| {
-            i == 0
-                || states.tooth[i] <= states.tooth[i - 1]
-                || states.input_angle_deg[i] > states.input_angle_deg[i - 1]
+        let goes_on = |&before: &usize, &i: &usize| {
+            states.tooth[i] > states.tooth[before] && states.input_angle_deg[i] <= states.input_angle_deg[before]
         };
-        let starts: Vec<usize> = (0..states.tooth.len()).filter(|&i| is_new(i)).collect();
-        let ends = starts.iter().skip(1).copied().chain([states.tooth.len()]);
-        let frames: Vec<_> = starts.iter().zip(ends).map(|(&from, to)| from..to).collect();
+        let indices: Vec<usize> = (0..states.tooth.len()).collect();
+        let frames: Vec<_> = indices.chunk_by(goes_on).collect();
         let mut points: Vec<(usize, bool)> = Vec::new();
         // The last frame repeats the first; it only tells whether a tooth entered before it.
-        for (frame, next) in frames.iter().zip(frames.iter().skip(1)) {
-            let jumps = *enters_under_load && !items_deviate && enters_loaded(states, frame.clone(), next.clone());
-            points.extend(frame.clone().map(|i| (i, jumps)));
+        for pair in frames.windows(2) {
+            let jumps = *enters_under_load && !items_deviate && enters_loaded(states, pair[0], pair[1]);
+            points.extend(pair[0].iter().map(|&i| (i, jumps)));
         }
         // Where an angle stands twice, what was before the jump comes first.
         points.sort_by(|&(one, one_jumps), &(other, other_jumps)| {
@@ -191,13 +187,13 @@ impl Pass {
 
 /// Whether a tooth that carries comes to a lobe from one frame to the next. Teeth ascend in either; where zones are unlike they have the numbers of their
 /// slots, of which the one that enters need not be the largest.
-fn enters_loaded(states: &StatesAnswer, frame: Range<usize>, next: Range<usize>) -> bool {
+fn enters_loaded(states: &StatesAnswer, frame: &[usize], next: &[usize]) -> bool {
     let lobe = |i: usize| states.lobe.as_ref().map_or(0, |lobe| lobe[i]);
     let is_loaded = |i: usize| states.loaded.as_ref().is_none_or(|loaded| loaded[i]);
-    let mut before = frame.peekable();
-    next.into_iter().any(|i| {
-        while before.next_if(|&j| states.tooth[j] < states.tooth[i]).is_some() {}
-        let was_there = before.peek().is_some_and(|&j| states.tooth[j] == states.tooth[i] && lobe(j) == lobe(i));
+    let mut before = frame.iter().peekable();
+    next.iter().any(|&i| {
+        while before.next_if(|&&j| states.tooth[j] < states.tooth[i]).is_some() {}
+        let was_there = before.peek().is_some_and(|&&j| states.tooth[j] == states.tooth[i] && lobe(j) == lobe(i));
         !was_there && is_loaded(i)
     })
 }

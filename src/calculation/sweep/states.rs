@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use serde::ser::SerializeSeq;
 use serde::{Serialize, Serializer};
 
 use super::NUMBER_TEXT_BYTES;
@@ -22,16 +23,6 @@ pub enum Column<'a> {
     Rolls(&'a [RollsAnswer]),
 }
 
-/// Entry of a column.
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Entry {
-    Number(f64),
-    Count(u32),
-    Flag(bool),
-    Rolls(RollsAnswer),
-}
-
 /// A state's entries of all columns.
 struct Row<'a> {
     columns: &'a [Column<'a>],
@@ -40,12 +31,16 @@ struct Row<'a> {
 
 impl Serialize for Row<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(self.columns.iter().map(|column| match column {
-            Column::Numbers(numbers) => Entry::Number(numbers[self.state]),
-            Column::Counts(counts) => Entry::Count(counts[self.state]),
-            Column::Flags(flags) => Entry::Flag(flags[self.state]),
-            Column::Rolls(rolls) => Entry::Rolls(rolls[self.state]),
-        }))
+        let mut row = serializer.serialize_seq(Some(self.columns.len()))?;
+        for column in self.columns {
+            match column {
+                Column::Numbers(numbers) => row.serialize_element(&numbers[self.state]),
+                Column::Counts(counts) => row.serialize_element(&counts[self.state]),
+                Column::Flags(flags) => row.serialize_element(&flags[self.state]),
+                Column::Rolls(rolls) => row.serialize_element(&rolls[self.state]),
+            }?;
+        }
+        row.end()
     }
 }
 

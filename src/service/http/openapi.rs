@@ -101,6 +101,10 @@ fn name_variants(document: &mut Value) {
         let mut mapping = Map::new();
         for variant in schema["oneOf"].as_array_mut().into_iter().flatten() {
             let Some(word) = word_of(variant, &tag).map(str::to_owned) else { continue };
+            // Unions of answers, which may get more fields, end in `Answer`.
+            if !name.ends_with("Answer") {
+                close(variant, &tag);
+            }
             let variant_name = format!("{name}{}", capitalised(&word));
             mapping.insert(word, json!(format!("#{SCHEMAS}/{variant_name}")));
             named.insert(variant_name.clone(), std::mem::replace(variant, reference(&variant_name)));
@@ -108,6 +112,13 @@ fn name_variants(document: &mut Value) {
         schema["discriminator"] = json!({ "propertyName": tag, "mapping": mapping });
     }
     schemas.append(&mut named);
+}
+
+/// Forbids unknown fields, as documents do, and requires the tag first.
+fn close(variant: &mut Value, tag: &str) {
+    variant["additionalProperties"] = json!(false);
+    let fields = variant["required"].as_array().into_iter().flatten().filter(|field| *field != tag);
+    variant["required"] = [json!(tag)].iter().chain(fields).cloned().collect();
 }
 
 /// Returns the field that has one fixed word in each variant.

@@ -3,6 +3,7 @@
 use super::{Flanks, INTERVALS, Lever, Piece, Side, Tooth, sum};
 use crate::SolveError;
 use crate::contact::PerContact;
+use crate::position::half_lobe_rad;
 use crate::root::{NotConverged, bracketed};
 
 /// Shortest stretch that is cut, as a fraction of a lap. Shorter ones are rounding.
@@ -169,7 +170,7 @@ impl<'a> FirstTeeth<'a> {
             for tooth in &self.teeth {
                 let Lever { center, flank, .. } = self.lever(tooth, node);
                 let position = &center.position;
-                if position.from_lobe_rad.min(position.from_valley_rad) > BESIDE * position.half_lobe_rad() {
+                if position.from_lobe_rad.min(position.from_valley_rad) > BESIDE * half_lobe_rad(position.lobes) {
                     continue;
                 }
                 let gap_mm = self.flanks.gaps(self.side).at(&tooth.place, center, flank);

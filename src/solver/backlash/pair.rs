@@ -3,7 +3,7 @@
 use super::first::{FirstTeeth, vertex};
 use super::{Found, MARGIN, sum};
 use crate::contact::PerContact;
-use crate::root::NotConverged;
+use crate::root::{NotConverged, golden_section};
 
 /// Largest relative difference to the trapezoid rule at which Simpson's rule is accepted. Its own error is about the
 /// square of it.
@@ -99,21 +99,13 @@ impl Pair<'_> {
             let best = if sign > 0.0 { found.smallest.1 } else { -found.largest.1 };
             // The parabola's error can be as large as its own prediction.
             if least - (nearest - least) < best - values[1].rounding_rad {
-                self.sections(start, end, sign, found)?;
+                // `found` keeps the extreme.
+                golden_section(start, end, SECTIONS, |fraction| {
+                    let value_rad = self.at(fraction)?.rad();
+                    found.see(self.lap as f64 + fraction, value_rad);
+                    Ok(sign * value_rad)
+                })?;
             }
-        }
-        Ok(())
-    }
-
-    fn sections(&self, start: f64, end: f64, sign: f64, found: &mut Found) -> Result<(), NotConverged> {
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let (mut low, mut high) = (start, end);
-        for _ in 0..SECTIONS {
-            let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-            let [at_left, at_right] = [self.at(left)?.rad(), self.at(right)?.rad()];
-            found.see(self.lap as f64 + left, at_left);
-            found.see(self.lap as f64 + right, at_right);
-            if sign * at_left < sign * at_right { high = right } else { low = left }
         }
         Ok(())
     }

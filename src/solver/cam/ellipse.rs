@@ -3,45 +3,28 @@
 
 use nalgebra::{Point2, Unit, Vector2};
 
-use crate::cam::kind::{CamContact, CurvePoint, Kind, ToothCenter};
+use crate::cam::kind::{CurvePoint, Direction, Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::{NotConverged, ValueAndSlope, bracketed, newton_in_bracket};
 
 /// An ellipse centred on the axis, `a > b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ellipse {
-    semi_major_mm: f64,
-    semi_minor_mm: f64,
-}
-
-/// Direction of a normal, the angle φ from the major axis.
-#[derive(Clone, Copy)]
-struct Normal {
-    cos: f64,
-    sin: f64,
+pub(crate) struct Ellipse {
+    /// `a`.
+    pub(crate) semi_major_mm: f64,
+    /// `b`.
+    pub(crate) semi_minor_mm: f64,
+    pub(crate) tooth_radius_mm: f64,
 }
 
 impl Ellipse {
-    pub(super) const fn new(semi_major_mm: f64, semi_minor_mm: f64) -> Self {
-        Self { semi_major_mm, semi_minor_mm }
-    }
-
-    /// Returns `a`.
-    pub const fn semi_major_mm(&self) -> f64 {
-        self.semi_major_mm
-    }
-
-    /// Returns `b`.
-    pub const fn semi_minor_mm(&self) -> f64 {
-        self.semi_minor_mm
-    }
-
     /// Returns `a² - b²`, as a product so that a nearly round cam keeps all its digits.
     pub(crate) fn difference_of_squares_mm2(&self) -> f64 {
         (self.semi_major_mm - self.semi_minor_mm) * (self.semi_major_mm + self.semi_minor_mm)
     }
 
-    fn support_mm(&self, normal: Normal) -> f64 {
+    /// Returns `h` for the angle φ of a normal.
+    fn support_mm(&self, normal: Direction) -> f64 {
         (self.semi_major_mm * normal.cos).hypot(self.semi_minor_mm * normal.sin)
     }
 
@@ -54,7 +37,7 @@ impl Ellipse {
 
     /// Returns `h'' = ρ_H - h`, as a product of differences that keeps its digits for a nearly round cam:
     /// `(a - b)(b sin²φ - a cos²φ)(ab + h²)/h³`.
-    fn support_second_derivative_mm(&self, normal: Normal, support_mm: f64) -> f64 {
+    fn support_second_derivative_mm(&self, normal: Direction, support_mm: f64) -> f64 {
         let (a, b, h) = (self.semi_major_mm, self.semi_minor_mm, support_mm);
         let (c, s) = (normal.cos, normal.sin);
         (a - b) * ((b * s * s - a * c * c) / h) * ((a / h) * (b / h) + 1.0)
@@ -62,28 +45,23 @@ impl Ellipse {
 
     /// Returns the normal at the tooth: `tan φ = tan ψ (a² + rh)/(b² + rh)`, with sums and products of positive terms
     /// only.
-    fn normal(&self, tooth_radius_mm: f64, position: Position, support_mm: f64) -> Normal {
-        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
+    fn normal(&self, position: Position, support_mm: f64) -> Direction {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, self.tooth_radius_mm);
         let cos = position.phase_cos * (b * b + r * support_mm);
         let sin = position.phase_sin * (a * a + r * support_mm);
         let length = cos.hypot(sin);
-        Normal { cos: cos / length, sin: sin / length }
+        Direction { cos: cos / length, sin: sin / length }
     }
 
-    fn normal_at(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> Normal {
-        self.normal(tooth_radius_mm, tooth.position, tooth.cam_contact.support_mm)
-    }
-
-    fn center(&self, tooth_radius_mm: f64, position: Position, normal: Normal) -> ToothCenter {
+    fn center(&self, position: Position, normal: Direction) -> ToothCenter {
         let support_mm = self.support_mm(normal);
-        let lever_arm_mm = self.difference_of_squares_mm2() * (normal.sin * normal.cos / support_mm);
-        let curvature_radius_mm = self.curvature_radius_mm(support_mm);
         ToothCenter::by_support(
             position,
-            tooth_radius_mm,
-            CamContact { support_mm, lever_arm_mm, curvature_per_mm: 1.0 / curvature_radius_mm },
-            curvature_radius_mm,
+            self.tooth_radius_mm,
+            support_mm,
+            self.difference_of_squares_mm2() * (normal.sin * normal.cos / support_mm),
             self.support_second_derivative_mm(normal, support_mm),
+            self.curvature_radius_mm(support_mm),
         )
     }
 }
@@ -93,10 +71,14 @@ impl Kind for Ellipse {
         2
     }
 
+    fn tooth_radius_mm(&self) -> f64 {
+        self.tooth_radius_mm
+    }
+
     /// The centre is `((a²/h + r) cos φ, (b²/h + r) sin φ)`, so φ follows from ψ and the support `h = h(φ)`. `h` is the
     /// one root in `[b, a]` of `sin²ψ (a² + rh)² (h² - b²) - cos²ψ (b² + rh)² (a² - h²)`.
-    fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged> {
-        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
+    fn at(&self, position: Position) -> Result<ToothCenter, NotConverged> {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, self.tooth_radius_mm);
         let Position { phase_cos: cos, phase_sin: sin, .. } = position;
         let guess = (a * cos).hypot(b * sin);
         let support_mm = newton_in_bracket("support of the cam at a tooth", b, a, guess, |h| {
@@ -108,13 +90,13 @@ impl Kind for Ellipse {
                 slope: 2.0 * (major * (r * sin * above_b + major * h) + minor * (minor * h - r * cos * below_a)),
             }
         })?;
-        Ok(self.center(r, position, self.normal(r, position, support_mm)))
+        Ok(self.center(position, self.normal(position, support_mm)))
     }
 
     /// At the steepest point `h''(h + r) = h'²`. In terms of `u = cos²φ` and divided by `a - b` this is
     /// `(b - (a + b) u)(ab + h²)(h + r) = h (a + b)(a² - b²) u (1 - u)`, with `h² = b² + (a² - b²) u`.
-    fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged> {
-        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
+    fn steepest(&self) -> Result<ToothCenter, NotConverged> {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, self.tooth_radius_mm);
         let difference = self.difference_of_squares_mm2();
         let condition = |u: f64| {
             let support_squared = b * b + difference * u;
@@ -122,7 +104,7 @@ impl Kind for Ellipse {
             Ok((b - (a + b) * u) * (a * b + support_squared) * (h + r) - h * (a + b) * difference * u * (1.0 - u))
         };
         let cos_squared = bracketed("largest pressure angle", 0.0, b * (a * b + b * b) * (b + r), 1.0, condition)?;
-        let normal = Normal { cos: cos_squared.sqrt(), sin: (1.0 - cos_squared).sqrt() };
+        let normal = Direction { cos: cos_squared.sqrt(), sin: (1.0 - cos_squared).sqrt() };
         let support_mm = (b * b + difference * cos_squared).sqrt();
         let major = normal.cos * (a * a / support_mm + r);
         let minor = normal.sin * (b * b / support_mm + r);
@@ -131,44 +113,44 @@ impl Kind for Ellipse {
         } else {
             Position::from_valley(major.atan2(minor), 2)
         };
-        Ok(self.center(r, position, normal))
+        Ok(self.center(position, normal))
     }
 
-    fn outer_radius_mm(&self, _: f64) -> f64 {
+    fn cam_outer_radius_mm(&self) -> f64 {
         self.semi_major_mm
     }
 
-    fn inner_radius_mm(&self, _: f64) -> f64 {
+    fn cam_inner_radius_mm(&self) -> f64 {
         self.semi_minor_mm
     }
 
     /// `b²/a`, on the major axis.
-    fn least_curvature_radius_mm(&self, _: f64) -> f64 {
+    fn least_curvature_radius_mm(&self) -> f64 {
         self.semi_minor_mm * (self.semi_minor_mm / self.semi_major_mm)
     }
 
     /// Uses `h² - b² = (a² - b²) cos²φ` and `h'² = (h² - b²)(a² - h²)/h²`.
-    fn center_rise_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
-        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
-        let h = tooth.cam_contact.support_mm;
-        let cos = self.normal_at(r, tooth).cos;
+    fn center_rise_mm2(&self, tooth: &ToothCenter) -> f64 {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, self.tooth_radius_mm);
+        let h = tooth.support_mm;
+        let cos = self.normal(tooth.position, h).cos;
         let cos_squared = cos * cos;
         self.difference_of_squares_mm2() * cos_squared * (2.0 * r / (h + b) + (a / h) * (a / h))
     }
 
     /// Uses `a² - h² = (a² - b²) sin²φ`.
-    fn center_drop_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
-        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, tooth_radius_mm);
-        let h = tooth.cam_contact.support_mm;
-        let sin = self.normal_at(r, tooth).sin;
+    fn center_drop_mm2(&self, tooth: &ToothCenter) -> f64 {
+        let (a, b, r) = (self.semi_major_mm, self.semi_minor_mm, self.tooth_radius_mm);
+        let h = tooth.support_mm;
+        let sin = self.normal(tooth.position, h).sin;
         let sin_squared = sin * sin;
         self.difference_of_squares_mm2() * sin_squared * (2.0 * r / (a + h) + (b / h) * (b / h))
     }
 
     /// `k² (a² - b²)/(a² + br)`.
-    fn tip_bend(&self, tooth_radius_mm: f64, ring_teeth_per_lobe: f64) -> f64 {
+    fn tip_bend(&self, ring_teeth_per_lobe: f64) -> f64 {
         let (a, b, k) = (self.semi_major_mm, self.semi_minor_mm, ring_teeth_per_lobe);
-        k * k * self.difference_of_squares_mm2() / (a * a + b * tooth_radius_mm)
+        k * k * self.difference_of_squares_mm2() / (a * a + b * self.tooth_radius_mm)
     }
 
     /// An ellipse is convex.
@@ -190,16 +172,16 @@ impl Kind for Ellipse {
     }
 
     /// The point is `(a² cos φ, b² sin φ)/h`.
-    fn contact_angle_from_valley_rad(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
+    fn contact_angle_from_valley_rad(&self, tooth: &ToothCenter) -> f64 {
         let (a, b) = (self.semi_major_mm, self.semi_minor_mm);
-        let normal = self.normal_at(tooth_radius_mm, tooth);
+        let normal = self.normal(tooth.position, tooth.support_mm);
         (a * (a * normal.cos)).atan2(b * (b * normal.sin))
     }
 
     /// Takes the place as the angle φ of the normal, so that no tooth position has to be found.
-    fn outline(&self, _: f64, set_back_mm: f64, place: Position) -> Result<CurvePoint, NotConverged> {
+    fn outline(&self, set_back_mm: f64, place: Position) -> Result<CurvePoint, NotConverged> {
         let (a, b) = (self.semi_major_mm, self.semi_minor_mm);
-        let normal = Normal { cos: place.phase_cos, sin: place.phase_sin };
+        let normal = Direction { cos: place.phase_cos, sin: place.phase_sin };
         let h = self.support_mm(normal);
         let point = Point2::new(a * (a / h) * normal.cos, b * (b / h) * normal.sin);
         Ok(CurvePoint {

@@ -3,45 +3,40 @@
 
 use std::f64::consts::PI;
 
-use crate::cam::kind::{CamContact, Kind, ToothCenter};
+use crate::cam::kind::{Kind, ToothCenter};
 use crate::position::Position;
 use crate::root::{NotConverged, bracketed};
 
 /// A cam with a harmonic path of the tooth centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HarmonicPath {
-    lobes: u32,
-    mean_radius_mm: f64,
-    amplitude_mm: f64,
+pub(crate) struct HarmonicPath {
+    pub(crate) lobes: u32,
+    /// `R`.
+    pub(crate) mean_radius_mm: f64,
+    /// `e`.
+    pub(crate) amplitude_mm: f64,
+    pub(crate) tooth_radius_mm: f64,
 }
 
 impl HarmonicPath {
-    pub(super) const fn new(lobes: u32, mean_radius_mm: f64, amplitude_mm: f64) -> Self {
-        Self { lobes, mean_radius_mm, amplitude_mm }
-    }
-
     /// Returns the lower bound of R. It exceeds `r + e`, so that the valley is outside the axis. With two lobes or more
     /// it exceeds the larger root of `r(R + e + eU²) = (R + e)²`, so that the lobe is round. With one lobe
     /// `r < √(R² - e²)` at the sharpest point follows from the first. With three lobes or more the flanks of a lobe may
     /// still meet if `R < 2e`.
-    pub(super) fn least_mean_radius_mm(
-        lobes: u32,
-        mean_radius_mm: f64,
-        amplitude_mm: f64,
-        tooth_radius_mm: f64,
-    ) -> f64 {
-        let (e, r) = (amplitude_mm, tooth_radius_mm);
+    pub(super) fn least_mean_radius_mm(&self) -> f64 {
+        let (e, r) = (self.amplitude_mm, self.tooth_radius_mm);
         let of_valley_mm = r + e;
-        if lobes < 2 {
+        if self.lobes < 2 {
             return of_valley_mm;
         }
-        let u = f64::from(lobes);
+        let u = self.lobe_count();
         let of_lobe_mm = 0.5 * (r + (r * (r + 4.0 * e * u * u)).sqrt()) - e;
         let round_mm = of_valley_mm.max(of_lobe_mm);
-        let between_flanks_mm = |mean_radius_mm| Self::new(lobes, mean_radius_mm, e).least_normal_mm() - r;
+        let between_flanks_mm = |mean_radius_mm| Self { mean_radius_mm, ..*self }.least_normal_mm() - r;
         let (from_mm, to_mm) = (round_mm, 2.0 * e);
-        let is_wide = mean_radius_mm >= to_mm || (mean_radius_mm > from_mm && between_flanks_mm(mean_radius_mm) > 0.0);
-        if lobes == 2 || from_mm >= to_mm || is_wide {
+        let mean_mm = self.mean_radius_mm;
+        let is_wide = mean_mm >= to_mm || (mean_mm > from_mm && between_flanks_mm(mean_mm) > 0.0);
+        if self.lobes == 2 || from_mm >= to_mm || is_wide {
             return round_mm;
         }
         let at_start_mm = between_flanks_mm(from_mm);
@@ -88,16 +83,6 @@ impl HarmonicPath {
         least_mm
     }
 
-    /// Returns `e`.
-    pub const fn amplitude_mm(&self) -> f64 {
-        self.amplitude_mm
-    }
-
-    /// Returns `R`.
-    pub(crate) const fn mean_radius_mm(&self) -> f64 {
-        self.mean_radius_mm
-    }
-
     pub(crate) fn lobe_count(&self) -> f64 {
         f64::from(self.lobes)
     }
@@ -105,12 +90,6 @@ impl HarmonicPath {
     /// Returns `d_v = R - e`.
     fn valley_mm(&self) -> f64 {
         self.mean_radius_mm - self.amplitude_mm
-    }
-
-    /// Returns `cos Uψ`.
-    fn cos_of_lobe(position: &Position) -> f64 {
-        let (cos, sin) = (position.phase_cos, position.phase_sin);
-        cos * cos - sin * sin
     }
 }
 
@@ -123,37 +102,35 @@ impl Kind for HarmonicPath {
         self.lobes
     }
 
+    fn tooth_radius_mm(&self) -> f64 {
+        self.tooth_radius_mm
+    }
+
     /// `T = eU sin(Uψ)/d`, `T_ψ = eU² cos(Uψ)/d + T²`, the path's curvature `κ_C = (cos γ/d)(1 + T_ψ/(1 + T²))`, and
     /// `1/ρ_H = κ_C/(1 - rκ_C)`, which has no pole at a straight part of the cam.
-    fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged> {
+    fn at(&self, position: Position) -> Result<ToothCenter, NotConverged> {
         let (u, e) = (self.lobe_count(), self.amplitude_mm);
         let (cos, sin) = (position.phase_cos, position.phase_sin);
-        let cos_of_lobe = Self::cos_of_lobe(&position);
+        // cos Uψ
+        let cos_of_lobe = cos * cos - sin * sin;
         let center_radius_mm = self.mean_radius_mm + e * cos_of_lobe;
         let t = 2.0 * e * u * (sin * cos) / center_radius_mm;
         let derivative = e * u * u * cos_of_lobe / center_radius_mm + t * t;
         let cos_gamma = 1.0 / (1.0 + t * t).sqrt();
         let path_curvature_per_mm = cos_gamma / center_radius_mm * (1.0 + derivative / (1.0 + t * t));
-        let cam_contact = CamContact {
-            support_mm: center_radius_mm * cos_gamma - tooth_radius_mm,
-            lever_arm_mm: center_radius_mm * (t * cos_gamma),
-            curvature_per_mm: path_curvature_per_mm / (1.0 - tooth_radius_mm * path_curvature_per_mm),
-        };
         Ok(ToothCenter {
             position,
-            cam_contact,
+            support_mm: center_radius_mm * cos_gamma - self.tooth_radius_mm,
+            lever_arm_mm: center_radius_mm * (t * cos_gamma),
+            cam_curvature_per_mm: path_curvature_per_mm / (1.0 - self.tooth_radius_mm * path_curvature_per_mm),
             center_radius_mm,
             tan_pressure_angle: t,
             tan_pressure_angle_derivative: derivative,
         })
     }
 
-    fn center_radius_mm(&self, _: f64, position: Position) -> Result<f64, NotConverged> {
-        Ok(self.mean_radius_mm + self.amplitude_mm * Self::cos_of_lobe(&position))
-    }
-
     /// At `cos Uψ = -e/R`.
-    fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged> {
+    fn steepest(&self) -> Result<ToothCenter, NotConverged> {
         let share = self.amplitude_mm / self.mean_radius_mm;
         let (cos, sin) = ((0.5 * (1.0 - share)).sqrt(), (0.5 * (1.0 + share)).sqrt());
         let position = Position {
@@ -163,19 +140,19 @@ impl Kind for HarmonicPath {
             phase_sin: sin,
             ..Position::lobe(self.lobes)
         };
-        self.tooth(tooth_radius_mm, position)
+        self.at(position)
     }
 
-    fn outer_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
-        self.mean_radius_mm + self.amplitude_mm - tooth_radius_mm
+    fn cam_outer_radius_mm(&self) -> f64 {
+        self.mean_radius_mm + self.amplitude_mm - self.tooth_radius_mm
     }
 
-    fn inner_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
-        self.valley_mm() - tooth_radius_mm
+    fn cam_inner_radius_mm(&self) -> f64 {
+        self.valley_mm() - self.tooth_radius_mm
     }
 
     /// In the middle of a lobe; with one lobe at `cos ψ = -e/R`, where the path's radius of curvature is `√(R² - e²)`.
-    fn least_curvature_radius_mm(&self, tooth_radius_mm: f64) -> f64 {
+    fn least_curvature_radius_mm(&self) -> f64 {
         let (e, u) = (self.amplitude_mm, self.lobe_count());
         let lobe_mm = self.mean_radius_mm + e;
         let path_mm = if self.lobes < 2 {
@@ -183,23 +160,23 @@ impl Kind for HarmonicPath {
         } else {
             lobe_mm * (lobe_mm / (lobe_mm + e * u * u))
         };
-        path_mm - tooth_radius_mm
+        path_mm - self.tooth_radius_mm
     }
 
     /// Uses `d - d_v = e(1 + cos Uψ)`.
-    fn center_rise_mm2(&self, _: f64, tooth: &ToothCenter) -> f64 {
+    fn center_rise_mm2(&self, tooth: &ToothCenter) -> f64 {
         let cos = tooth.position.phase_cos;
         2.0 * self.amplitude_mm * cos * cos * (tooth.center_radius_mm + self.valley_mm())
     }
 
     /// Uses `d_l - d = e(1 - cos Uψ)`.
-    fn center_drop_mm2(&self, _: f64, tooth: &ToothCenter) -> f64 {
+    fn center_drop_mm2(&self, tooth: &ToothCenter) -> f64 {
         let sin = tooth.position.phase_sin;
         2.0 * self.amplitude_mm * sin * sin * (tooth.center_radius_mm + (self.mean_radius_mm + self.amplitude_mm))
     }
 
     /// `eZ_K²/(R - e)`.
-    fn tip_bend(&self, _: f64, ring_teeth_per_lobe: f64) -> f64 {
+    fn tip_bend(&self, ring_teeth_per_lobe: f64) -> f64 {
         let ring_teeth = ring_teeth_per_lobe * self.lobe_count();
         self.amplitude_mm * ring_teeth * ring_teeth / self.valley_mm()
     }

@@ -3,28 +3,25 @@
 
 use nalgebra::{Point2, Unit, Vector2};
 
-use crate::position::Position;
+use crate::position::{Position, half_lobe_rad};
 use crate::root::NotConverged;
-
-/// Contact of the cam with a tooth.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CamContact {
-    /// Support function `h(φ)`: distance of the tangent from the axis.
-    pub support_mm: f64,
-    /// `|h'(φ)|`: lever arm, about the axis, of a force along the normal.
-    pub lever_arm_mm: f64,
-    /// `1/ρ_H`; negative where the cam is concave.
-    pub curvature_per_mm: f64,
-}
 
 /// Point of an outline, with its tangent and sign of curvature.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct CurvePoint {
-    pub(crate) point: Point2<f64>,
+pub struct CurvePoint {
+    /// The point, in mm.
+    pub point: Point2<f64>,
     /// Tangent, counter-clockwise.
-    pub(crate) tangent: Unit<Vector2<f64>>,
+    pub tangent: Unit<Vector2<f64>>,
     /// Curvature up to a positive factor: its sign changes at an inflection.
-    pub(crate) bend: f64,
+    pub bend: f64,
+}
+
+/// Cosine and sine of an angle.
+#[derive(Clone, Copy)]
+pub(super) struct Direction {
+    pub(super) cos: f64,
+    pub(super) sin: f64,
 }
 
 /// A tooth at one position. Mesh, ring and load follow from `d`, `T` and `T_ψ` only.
@@ -32,8 +29,12 @@ pub(crate) struct CurvePoint {
 pub struct ToothCenter {
     /// Position of the tooth.
     pub position: Position,
-    /// Contact with the cam.
-    pub cam_contact: CamContact,
+    /// Support function `h(φ)` of the cam: distance of the tangent from the axis.
+    pub support_mm: f64,
+    /// `|h'(φ)|`: lever arm, about the axis, of a force along the cam's normal.
+    pub lever_arm_mm: f64,
+    /// `1/ρ_H` of the cam; negative where it is concave.
+    pub cam_curvature_per_mm: f64,
     /// `d`: distance of its centre from the axis.
     pub center_radius_mm: f64,
     /// `T = tan γ = |h'|/(h + r)`, γ the pressure angle at the wave generator.
@@ -48,16 +49,18 @@ impl ToothCenter {
     pub(crate) fn by_support(
         position: Position,
         tooth_radius_mm: f64,
-        cam_contact: CamContact,
-        cam_curvature_radius_mm: f64,
+        support_mm: f64,
+        lever_arm_mm: f64,
         support_second_derivative_mm: f64,
+        cam_curvature_radius_mm: f64,
     ) -> Self {
-        let lever_arm_mm = cam_contact.lever_arm_mm;
-        let offset_support_mm = cam_contact.support_mm + tooth_radius_mm;
+        let offset_support_mm = support_mm + tooth_radius_mm;
         let t = lever_arm_mm / offset_support_mm;
         Self {
             position,
-            cam_contact,
+            support_mm,
+            lever_arm_mm,
+            cam_curvature_per_mm: 1.0 / cam_curvature_radius_mm,
             center_radius_mm: offset_support_mm.hypot(lever_arm_mm),
             tan_pressure_angle: t,
             tan_pressure_angle_derivative: (1.0 + t * t) * (t * lever_arm_mm - support_second_derivative_mm)
@@ -77,42 +80,63 @@ impl ToothCenter {
     }
 }
 
-/// Geometry of a kind of wave generator, for teeth of the radius `r`.
+/// Geometry of a kind of wave generator and of the path of the teeth's centres around it, for teeth of the radius `r`.
+/// The path is the outer parallel curve of the cam at that radius.
 ///
-/// Mesh and load follow from [`Kind::tooth`] only. The other methods are closed forms. They give lengths whose
-/// differences decide what fits, and properties of the valley, where a flank may be irregular by less than rounding.
-pub(crate) trait Kind {
+/// Mesh and load follow from [`Kind::at`] only. The other methods are closed forms. They give lengths whose differences
+/// decide what fits, and properties of the valley, where a flank may be irregular by less than rounding.
+pub trait Kind {
     /// Returns `U`.
     fn lobes(&self) -> u32;
 
-    /// Returns the tooth whose centre is at `position`.
-    fn tooth(&self, tooth_radius_mm: f64, position: Position) -> Result<ToothCenter, NotConverged>;
+    /// Returns `r`.
+    fn tooth_radius_mm(&self) -> f64;
 
-    /// Returns `d` only.
-    fn center_radius_mm(&self, tooth_radius_mm: f64, position: Position) -> Result<f64, NotConverged> {
-        Ok(self.tooth(tooth_radius_mm, position)?.center_radius_mm)
+    /// Returns the tooth whose centre is at `position`.
+    ///
+    /// # Errors
+    /// [`NotConverged`] if its contact with the cam is not found.
+    fn at(&self, position: Position) -> Result<ToothCenter, NotConverged>;
+
+    /// Returns `d` at any angle from a lobe.
+    ///
+    /// # Errors
+    /// As [`Kind::at`].
+    fn center_radius_at_mm(&self, angle_rad: f64) -> Result<f64, NotConverged> {
+        let (lobes, half_rad) = (self.lobes(), half_lobe_rad(self.lobes()));
+        let pitch_rad = 2.0 * half_rad;
+        let folded = angle_rad.rem_euclid(pitch_rad);
+        let position = if folded > 0.5 * half_rad && folded < 1.5 * half_rad {
+            Position::from_valley((folded - half_rad).abs(), lobes)
+        } else {
+            Position::from_lobe(folded.min(pitch_rad - folded), lobes)
+        };
+        Ok(self.at(position)?.center_radius_mm)
     }
 
-    /// Returns the tooth with the largest pressure angle, where `dT/dψ = 0`.
-    fn steepest(&self, tooth_radius_mm: f64) -> Result<ToothCenter, NotConverged>;
+    /// Returns the tooth with the largest pressure angle at the wave generator, where `dT/dψ = 0`.
+    ///
+    /// # Errors
+    /// [`NotConverged`] if its position is not found.
+    fn steepest(&self) -> Result<ToothCenter, NotConverged>;
 
     /// Returns the cam's largest distance from the axis, in the middle of a lobe: `d_l - r`.
-    fn outer_radius_mm(&self, tooth_radius_mm: f64) -> f64;
+    fn cam_outer_radius_mm(&self) -> f64;
 
     /// Returns the cam's least distance from the axis, in a valley: `d_v - r`.
-    fn inner_radius_mm(&self, tooth_radius_mm: f64) -> f64;
+    fn cam_inner_radius_mm(&self) -> f64;
 
     /// Returns the least radius of curvature of the cam in its convex part.
-    fn least_curvature_radius_mm(&self, tooth_radius_mm: f64) -> f64;
+    fn least_curvature_radius_mm(&self) -> f64;
 
     /// Returns `d² - d_v²`, free of cancellation towards the valley.
-    fn center_rise_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64;
+    fn center_rise_mm2(&self, tooth: &ToothCenter) -> f64;
 
     /// Returns `d_l² - d²`, free of cancellation towards the lobe.
-    fn center_drop_mm2(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64;
+    fn center_drop_mm2(&self, tooth: &ToothCenter) -> f64;
 
     /// Returns `-k² T_ψ` in the valley, which sets the curvature of the ring's tip: `d_v κ = 1 - this`.
-    fn tip_bend(&self, tooth_radius_mm: f64, ring_teeth_per_lobe: f64) -> f64;
+    fn tip_bend(&self, ring_teeth_per_lobe: f64) -> f64;
 
     /// Returns the least tooth radius that undercuts the ring; none if no radius does.
     fn critical_tooth_radius_mm(&self, ring_teeth_per_lobe: f64) -> Option<f64>;
@@ -130,29 +154,32 @@ pub(crate) trait Kind {
     /// No centre is closer to the axis than `d_v`, and `d_v sin > r` is sufficient.
     fn surely_free_radius_mm(&self, sin: f64) -> f64 {
         // The cam does not depend on the tooth radius, so d_v grows with r.
-        self.inner_radius_mm(0.0) * (sin / (1.0 - sin))
+        self.cam_inner_radius_mm() * (sin / (1.0 - sin))
     }
 
-    /// Returns the angle φ_H of the contact point from the valley, about the axis of rotation.
-    fn contact_angle_from_valley_rad(&self, tooth_radius_mm: f64, tooth: &ToothCenter) -> f64 {
-        let normal_mm = tooth_radius_mm * tooth.cos_pressure_angle();
+    /// Returns the angle φ_H of a tooth's contact point from the valley, about the axis of rotation.
+    fn contact_angle_from_valley_rad(&self, tooth: &ToothCenter) -> f64 {
+        let normal_mm = self.tooth_radius_mm() * tooth.cos_pressure_angle();
         let behind_rad = (normal_mm * tooth.tan_pressure_angle).atan2(tooth.center_radius_mm - normal_mm);
         tooth.position.from_valley_rad + behind_rad
     }
 
     /// Returns the point of the outline where the tooth at `place` touches it, offset inward along its normal. A kind
-    /// whose outline is known by the normal's angle may take `place` as that angle.
-    fn outline(&self, tooth_radius_mm: f64, set_back_mm: f64, place: Position) -> Result<CurvePoint, NotConverged> {
-        let tooth = self.tooth(tooth_radius_mm, place)?;
+    /// whose outline is known by the normal's angle may take `place` as that angle. Both ends are exact.
+    ///
+    /// # Errors
+    /// As [`Kind::at`].
+    fn outline(&self, set_back_mm: f64, place: Position) -> Result<CurvePoint, NotConverged> {
+        let tooth = self.at(place)?;
         let (sin, cos) = tooth.normal_rad().sin_cos();
-        let inside_mm = tooth_radius_mm + set_back_mm;
+        let inside_mm = self.tooth_radius_mm() + set_back_mm;
         let (center_sin, center_cos) = place.from_lobe_rad.sin_cos();
         let center = tooth.center_radius_mm * Vector2::new(center_cos, center_sin);
         Ok(CurvePoint {
             point: Point2::from(center - inside_mm * Vector2::new(cos, sin)),
             tangent: Unit::new_unchecked(Vector2::new(-sin, cos)),
             // Sign as for the cam itself, as long as its parallel curves are regular.
-            bend: tooth.cam_contact.curvature_per_mm,
+            bend: tooth.cam_curvature_per_mm,
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Wave generators, one file for each kind (docs/explanation/theory.md section 2).
 //!
-//! To add a kind, add a file that implements `Kind` (`kind.rs`). Then add a variant of [`Cam`] with its arm in
-//! `Cam::kind`, and a variant of [`WaveGenerator`] with its arms in the methods below.
+//! To add a kind, add a file that implements `Kind` (`kind.rs`). Then add a variant of `Cam` with its arms in
+//! `Cam::kind` and `Cam::with_tooth_radius`, and a variant of [`WaveGenerator`] with its arms in the methods below.
 
 mod ellipse;
 mod harmonic;
@@ -10,12 +10,10 @@ mod kind;
 
 use crate::violation::{FieldCode, Parameter, Violation};
 
-pub use ellipse::Ellipse;
-pub use harmonic::Harmonic;
-pub use harmonic_path::HarmonicPath;
-pub(crate) use kind::CurvePoint;
-use kind::Kind;
-pub use kind::{CamContact, ToothCenter};
+pub(crate) use ellipse::Ellipse;
+pub(crate) use harmonic::Harmonic;
+pub(crate) use harmonic_path::HarmonicPath;
+pub use kind::{CurvePoint, Kind, ToothCenter};
 
 /// Parameters of a wave generator, not yet checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,15 +53,12 @@ pub enum WaveGenerator {
     },
 }
 
-/// A wave generator with checked parameters.
+/// A wave generator with checked parameters, for teeth of one radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum Cam {
-    /// An ellipse.
+pub(crate) enum Cam {
     Ellipse(Ellipse),
-    /// A harmonic support function; with one lobe an eccentric circle.
+    /// With one lobe an eccentric circle.
     Harmonic(Harmonic),
-    /// A harmonic path of the tooth centres.
     HarmonicPath(HarmonicPath),
 }
 
@@ -74,6 +69,15 @@ impl Cam {
             Self::Ellipse(cam) => cam,
             Self::Harmonic(cam) => cam,
             Self::HarmonicPath(cam) => cam,
+        }
+    }
+
+    /// Returns the cam for teeth of another radius.
+    pub(crate) const fn with_tooth_radius(self, tooth_radius_mm: f64) -> Self {
+        match self {
+            Self::Ellipse(cam) => Self::Ellipse(Ellipse { tooth_radius_mm, ..cam }),
+            Self::Harmonic(cam) => Self::Harmonic(Harmonic { tooth_radius_mm, ..cam }),
+            Self::HarmonicPath(cam) => Self::HarmonicPath(HarmonicPath { tooth_radius_mm, ..cam }),
         }
     }
 }
@@ -142,11 +146,6 @@ impl WaveGenerator {
         }
     }
 
-    /// True if the cam is an eccentric circle.
-    pub const fn is_eccentric_circle(&self) -> bool {
-        matches!(self, Self::Eccentric { .. })
-    }
-
     /// Returns the cam for teeth of this radius. Every parameter must be in its range.
     ///
     /// # Errors
@@ -157,7 +156,7 @@ impl WaveGenerator {
         match *self {
             Self::Ellipse { semi_major_mm, semi_minor_mm } => {
                 if semi_major_mm > semi_minor_mm {
-                    Ok(Cam::Ellipse(Ellipse::new(semi_major_mm, semi_minor_mm)))
+                    Ok(Cam::Ellipse(Ellipse { semi_major_mm, semi_minor_mm, tooth_radius_mm }))
                 } else {
                     let detail = format!(
                         "the semi-major axis ({semi_major_mm:?} mm) must exceed the semi-minor axis ({semi_minor_mm:?} mm): a round cam moves no tooth"
@@ -166,16 +165,16 @@ impl WaveGenerator {
                     Err(Violation::new(code, Parameter::SemiMajor, semi_major_mm, semi_minor_mm, detail))
                 }
             }
-            Self::Eccentric { radius_mm: radius, eccentricity_mm: stroke }
-            | Self::Harmonic { mean_radius_mm: radius, amplitude_mm: stroke, .. } => {
-                self.wide_enough(radius, Harmonic::least_mean_radius_mm(lobes, stroke))?;
-                Ok(Cam::Harmonic(Harmonic::new(lobes, radius, stroke)))
+            Self::Eccentric { radius_mm: mean_radius_mm, eccentricity_mm: amplitude_mm }
+            | Self::Harmonic { mean_radius_mm, amplitude_mm, .. } => {
+                let cam = Harmonic { lobes, mean_radius_mm, amplitude_mm, tooth_radius_mm };
+                self.wide_enough(mean_radius_mm, cam.least_mean_radius_mm())?;
+                Ok(Cam::Harmonic(cam))
             }
-            Self::HarmonicPath { mean_path_radius_mm, amplitude_mm, .. } => {
-                let least_mm =
-                    HarmonicPath::least_mean_radius_mm(lobes, mean_path_radius_mm, amplitude_mm, tooth_radius_mm);
-                self.wide_enough(mean_path_radius_mm, least_mm)?;
-                Ok(Cam::HarmonicPath(HarmonicPath::new(lobes, mean_path_radius_mm, amplitude_mm)))
+            Self::HarmonicPath { mean_path_radius_mm: mean_radius_mm, amplitude_mm, .. } => {
+                let cam = HarmonicPath { lobes, mean_radius_mm, amplitude_mm, tooth_radius_mm };
+                self.wide_enough(mean_radius_mm, cam.least_mean_radius_mm())?;
+                Ok(Cam::HarmonicPath(cam))
             }
         }
     }

@@ -2,9 +2,8 @@
 
 use super::neighbours::Neighbours;
 use super::tooth_counts::{installed_no_divisor, tooth_difference};
-use super::{Drive, DriveParameters, ToothShape};
+use super::{Drive, DriveParameters};
 use crate::cam::WaveGenerator;
-use crate::locus::Locus;
 use crate::ring::{RingFlank, RingTooth};
 use crate::root::NotConverged;
 use crate::violation::{FieldCode, Parameter, Violation};
@@ -13,12 +12,12 @@ use crate::violation::{FieldCode, Parameter, Violation};
 /// impossible value hides no other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
-    pub(super) parameters: DriveParameters,
+    pub(crate) parameters: DriveParameters,
     pub(super) violations: Vec<Violation>,
     /// Largest and least distance of the cam from the axis.
     pub(crate) cam_outer_mm: Option<f64>,
     pub(crate) cam_inner_mm: Option<f64>,
-    /// Largest possible inward offset of the cam.
+    /// Inward offset of the cam at which it gets a cusp or reaches the axis.
     pub(crate) greatest_set_back_mm: Option<f64>,
     pub(crate) installed: Option<i64>,
     pub(crate) tooth_radius_mm: Option<f64>,
@@ -55,7 +54,7 @@ impl Draft {
         let mut cam = None;
         if let Some((wave_generator, radius_mm)) = wave_generator.zip(cam_tooth_radius_mm) {
             match wave_generator.cam(radius_mm) {
-                Ok(possible) => cam = Some(Locus::new(possible, radius_mm)),
+                Ok(possible) => cam = Some(possible),
                 Err(violation) => violations.push(violation),
             }
         }
@@ -65,12 +64,9 @@ impl Draft {
                 let in_range = |parameter: Parameter, value| parameter.check(value).is_none().then_some(value);
                 (in_range(Parameter::SemiMajor, semi_major_mm), in_range(Parameter::SemiMinor, semi_minor_mm))
             }
-            _ => (cam.map(|cam| cam.cam_outer_radius_mm()), cam.map(|cam| cam.cam_inner_radius_mm())),
+            _ => (cam.map(|cam| cam.kind().cam_outer_radius_mm()), cam.map(|cam| cam.kind().cam_inner_radius_mm())),
         };
-        let lobes = wave_generator.map(|wave_generator| wave_generator.lobes()).or_else(|| {
-            let lobes = p.wave_generator.lobes();
-            Parameter::Lobes.check(lobes as f64).is_none().then_some(lobes)
-        });
+        let lobes = Some(p.wave_generator.lobes()).filter(|&lobes| Parameter::Lobes.check(lobes as f64).is_none());
         let mut sense = None;
         if let Some(((teeth, ring_teeth), lobes)) = teeth.zip(ring_teeth).zip(lobes) {
             match tooth_difference(teeth, ring_teeth, lobes) {
@@ -100,10 +96,10 @@ impl Draft {
             }
         }
 
-        let locus = cam.zip(tooth_radius_mm).map(|(cam, tooth_radius_mm)| Locus::new(*cam.cam(), tooth_radius_mm));
-        let ring = match locus.zip(ring_teeth).filter(|_| bore_is_possible) {
-            Some((locus, ring_teeth)) => {
-                let flank = RingFlank::new(locus, ring_teeth as f64 / f64::from(locus.lobes()));
+        let cam_of_teeth = cam.filter(|_| tooth_radius_mm.is_some());
+        let ring = match cam_of_teeth.zip(ring_teeth).filter(|_| bore_is_possible) {
+            Some((cam, ring_teeth)) => {
+                let flank = RingFlank::new(cam, ring_teeth as f64 / f64::from(cam.kind().lobes()));
                 Some(RingTooth::new(flank, p.tip_radius_mm)?)
             }
             None => None,
@@ -123,15 +119,16 @@ impl Draft {
                 violations.push(Violation::new(FieldCode::NoCarrierAnnulus, parameter, value_mm, limit_mm, detail));
             }
         }
-        if let Some((locus, installed)) = locus.zip(installed) {
-            violations.extend(Neighbours { locus, installed }.violation()?);
+        if let Some((cam, installed)) = cam_of_teeth.zip(installed) {
+            violations.extend(Neighbours { cam, installed }.violation()?);
         }
         Ok(Self {
             parameters: p,
             violations,
             cam_outer_mm,
             cam_inner_mm,
-            greatest_set_back_mm: cam.map(|cam| cam.greatest_set_back_mm()),
+            greatest_set_back_mm: cam
+                .map(|cam| cam.kind().least_curvature_radius_mm().min(cam.kind().cam_inner_radius_mm())),
             installed,
             tooth_radius_mm,
             slot_half_width_mm,
@@ -143,11 +140,6 @@ impl Draft {
     /// Returns every reason why the drive cannot exist.
     pub fn violations(&self) -> &[Violation] {
         &self.violations
-    }
-
-    /// Returns true if the teeth have flats.
-    pub(crate) const fn has_flats(&self) -> bool {
-        matches!(self.parameters.tooth, ToothShape::FlatSided { .. })
     }
 
     /// Returns the drive if it can exist.

@@ -3,15 +3,14 @@
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
 use crate::cam::{Cam, Ellipse};
-use crate::locus::Locus;
 use crate::position::{Position, half_lobe_rad};
-use crate::root::{NotConverged, bracketed};
+use crate::root::{NotConverged, bracketed, golden_section};
 use crate::violation::{FieldCode, Parameter, Violation};
 
 /// Neighbouring teeth on their path.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neighbours {
-    pub(super) locus: Locus,
+    pub(super) cam: Cam,
     pub(super) installed: i64,
 }
 
@@ -24,12 +23,12 @@ impl Neighbours {
     /// Returns the tooth radius below which neighbouring teeth cannot touch. It follows from the least centre radius,
     /// in the valley. This bound settles nearly every drive.
     fn surely_free_radius_mm(&self) -> f64 {
-        self.locus.cam().kind().surely_free_radius_mm(self.half_spacing_rad().sin())
+        self.cam.kind().surely_free_radius_mm(self.half_spacing_rad().sin())
     }
 
     /// Returns a violation if neighbouring teeth touch.
     pub(super) fn violation(&self) -> Result<Option<Violation>, NotConverged> {
-        let tooth_radius_mm = self.locus.tooth_radius_mm();
+        let tooth_radius_mm = self.cam.kind().tooth_radius_mm();
         if tooth_radius_mm < self.surely_free_radius_mm() {
             return Ok(None);
         }
@@ -50,12 +49,12 @@ impl Neighbours {
     /// an ellipse it is that of the pair across the minor axis. With two or three teeth, which are more than a right
     /// angle apart, the pair across the major axis is closer to the minor axis.
     pub(super) fn least_center_distance_mm(&self) -> Result<f64, NotConverged> {
-        if !matches!(self.locus.cam(), Cam::Ellipse(_)) {
+        if !matches!(self.cam, Cam::Ellipse(_)) {
             return self.least_scanned_distance_mm();
         }
         let half_rad = self.half_spacing_rad();
-        let nearest = Position::from_valley(half_rad.min(FRAC_PI_2 - half_rad), self.locus.lobes());
-        Ok(2.0 * half_rad.sin() * self.locus.at(nearest)?.center_radius_mm)
+        let nearest = Position::from_valley(half_rad.min(FRAC_PI_2 - half_rad), 2);
+        Ok(2.0 * half_rad.sin() * self.cam.kind().at(nearest)?.center_radius_mm)
     }
 
     /// Returns the least distance of two neighbouring centres around any cam. It scans the middle of the pair, then
@@ -64,11 +63,11 @@ impl Neighbours {
         const SCAN: u32 = 96;
         let half = self.half_spacing_rad();
         let distance = |middle_rad: f64| -> Result<f64, NotConverged> {
-            let before = self.locus.center_radius_at_mm(middle_rad - half)?;
-            let after = self.locus.center_radius_at_mm(middle_rad + half)?;
+            let before = self.cam.kind().center_radius_at_mm(middle_rad - half)?;
+            let after = self.cam.kind().center_radius_at_mm(middle_rad + half)?;
             Ok((before - after).hypot(2.0 * half.sin() * (before * after).sqrt()))
         };
-        let valley_rad = half_lobe_rad(self.locus.lobes());
+        let valley_rad = half_lobe_rad(self.cam.kind().lobes());
         let step = valley_rad / f64::from(SCAN);
         let mut best = (valley_rad, distance(valley_rad)?);
         for i in 0..SCAN {
@@ -78,16 +77,9 @@ impl Neighbours {
                 best = (middle, value);
             }
         }
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let (mut low, mut high) = (best.0 - step, best.0 + step);
         // Forty steps shrink the bracket by 4e-9, which gives the minimum to all digits.
-        for _ in 0..40 {
-            let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-            let (at_left, at_right) = (distance(left)?, distance(right)?);
-            best.1 = best.1.min(at_left).min(at_right);
-            if at_left < at_right { high = right } else { low = left }
-        }
-        Ok(best.1)
+        let (least, _) = golden_section(best.0 - step, best.0 + step, 40, distance)?;
+        Ok(best.1.min(least))
     }
 
     /// Returns the radius, at most that of the teeth, at which neighbours begin to touch. Centres of thicker teeth are
@@ -95,20 +87,20 @@ impl Neighbours {
     /// radius's logarithm, because radii range over twelve decades. If the path itself is given, it is the same for all
     /// radii, and the result is half the least distance.
     fn touching_radius_mm(&self, center_distance_mm: f64) -> Result<f64, NotConverged> {
-        match self.locus.cam() {
+        match &self.cam {
             Cam::Ellipse(cam) if self.installed > 3 => return self.touching_radius_of_ellipse_mm(cam),
             cam if cam.kind().is_path() => return Ok(0.5 * center_distance_mm),
             _ => {}
         }
         let free_mm = 0.5 * self.surely_free_radius_mm();
-        let at = |exponent: f64| Self { locus: Locus::new(*self.locus.cam(), free_mm * exponent.exp()), ..*self };
+        let at = |exponent: f64| Self { cam: self.cam.with_tooth_radius(free_mm * exponent.exp()), ..*self };
         let gap_mm = |exponent: f64| {
             let thinner = at(exponent);
-            Ok(thinner.least_center_distance_mm()? - 2.0 * thinner.locus.tooth_radius_mm())
+            Ok(thinner.least_center_distance_mm()? - 2.0 * thinner.cam.kind().tooth_radius_mm())
         };
-        let most = (self.locus.tooth_radius_mm() / free_mm).ln();
+        let most = (self.cam.kind().tooth_radius_mm() / free_mm).ln();
         let exponent = bracketed("radius at which teeth touch", 0.0, gap_mm(0.0)?, most, gap_mm)?;
-        Ok(at(exponent).locus.tooth_radius_mm())
+        Ok(at(exponent).cam.kind().tooth_radius_mm())
     }
 
     /// Returns, for an ellipse and four teeth or more, the radius at which the two teeth across the minor axis touch.
@@ -117,7 +109,7 @@ impl Neighbours {
     /// section 2.2. With `a² cos φ/h = r (1 - cos φ)` and `b² sin φ/h = r (cot μ - sin φ)` the normal's angle is the
     /// one root of `a² cos φ (cot μ - sin φ) = b² sin φ (1 - cos φ)` above 45°.
     fn touching_radius_of_ellipse_mm(&self, cam: &Ellipse) -> Result<f64, NotConverged> {
-        let (a, b) = (cam.semi_major_mm(), cam.semi_minor_mm());
+        let (a, b) = (cam.semi_major_mm, cam.semi_minor_mm);
         let half_rad = self.half_spacing_rad();
         // cot μ - 1 and, below, 1 - sin φ and 1 - cos φ, without a difference of nearly equal values.
         let beyond_one =

@@ -12,9 +12,6 @@ use crate::root::NotConverged;
 use crate::tooth_space::ToothSpace;
 
 /// Returns the findings about a manufactured part.
-///
-/// # Errors
-/// [`NotConverged`] from the geometry.
 pub(crate) fn of_made_part(drive: &Drive, part: &MadePart) -> Result<Vec<Finding>, NotConverged> {
     match part {
         MadePart::Ring { space, outer_radius_mm } => Ok(of_ring(drive, space, *outer_radius_mm)),

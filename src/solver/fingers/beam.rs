@@ -46,16 +46,6 @@ pub struct FingerBeam {
     pub foot: f64,
 }
 
-/// Bending, foot and shear of a beam of a material.
-struct Elastic {
-    /// `E I`, lower by the radial part of the bending.
-    bending_nmm2: f64,
-    /// Rotation of the foot for each unit of moment.
-    foot_per_nmm: f64,
-    /// `κ G A`.
-    shear_n: f64,
-}
-
 impl FingerBeam {
     /// Returns the finger of a carrier. None if its slots overlap at the middle of its height.
     pub(crate) fn of(drive: &Drive, carrier: &CarrierPart) -> Option<Self> {
@@ -72,8 +62,12 @@ impl FingerBeam {
         PI / self.count as f64
     }
 
-    fn elastic(&self, material: &Material) -> Elastic {
-        let Self { length_mm: _, thickness_mm, height_mm, count: _, foot } = *self;
+    /// Returns the mean deflection along the finger divided by the force, which is the displacement of a straight tooth
+    /// on its wall. Bending and shear follow Timoshenko. A ring at the far ends moves with the mean force of all teeth;
+    /// the compliance is that of springs that do the same work.
+    pub fn compliance_mm_per_n(&self, material: &Material, fingers: Fingers) -> f64 {
+        let Self { length_mm, thickness_mm, height_mm, count: _, foot } = *self;
+        let (squared, cubed) = (length_mm.powi(2), length_mm.powi(3));
         let youngs_mpa = 1e3 * material.youngs_modulus_gpa;
         let shear_mpa = youngs_mpa / (2.0 * (1.0 + material.poissons_ratio));
         let area_mm2 = thickness_mm * height_mm;
@@ -81,20 +75,12 @@ impl FingerBeam {
         let (sin, cos) = self.wall_angle_rad().sin_cos();
         let slenderness = thickness_mm / height_mm;
         let both_ways = cos * cos + slenderness * slenderness * sin * sin;
-        Elastic {
-            bending_nmm2: youngs_mpa * area_mm2 * thickness_mm * thickness_mm / 12.0 / both_ways,
-            foot_per_nmm: foot * material.compliance_per_mpa() / (thickness_mm * thickness_mm * height_mm),
-            shear_n: SHEAR * shear_mpa * area_mm2,
-        }
-    }
-
-    /// Returns the mean deflection along the finger divided by the force, which is the displacement of a straight tooth
-    /// on its wall. Bending and shear follow Timoshenko. A ring at the far ends moves with the mean force of all teeth;
-    /// the compliance is that of springs that do the same work.
-    pub fn compliance_mm_per_n(&self, material: &Material, fingers: Fingers) -> f64 {
-        let length_mm = self.length_mm;
-        let (squared, cubed) = (length_mm.powi(2), length_mm.powi(3));
-        let Elastic { bending_nmm2, foot_per_nmm, shear_n } = self.elastic(material);
+        // `E I`, lower by the radial part of the bending.
+        let bending_nmm2 = youngs_mpa * area_mm2 * thickness_mm * thickness_mm / 12.0 / both_ways;
+        // Rotation of the foot for each unit of moment.
+        let foot_per_nmm = foot * material.compliance_per_mpa() / (thickness_mm * thickness_mm * height_mm);
+        // `κ G A`.
+        let shear_n = SHEAR * shear_mpa * area_mm2;
         match fingers {
             Fingers::HeldAtOneEnd => {
                 cubed / (20.0 * bending_nmm2) + foot_per_nmm * squared / 4.0 + length_mm / (3.0 * shear_n)

@@ -57,7 +57,7 @@ impl Overhang {
 /// # Errors
 /// [`NotConverged`] from the geometry.
 pub fn slice_compliance_mm2_per_n(drive: &Drive, p: &LoadParameters) -> Result<f64, NotConverged> {
-    let center = drive.steepest_engaged()?;
+    let center = drive.ring_tooth().steepest_engaged()?;
     let flank = drive.flank().at(&center);
     let ratio = force_ratio(drive.sense(), drive.flank(), &center);
     let curvatures = curvature_per_mm(drive, &center, &flank);
@@ -71,7 +71,8 @@ fn contact_slice_mm2_per_n(drive: &Drive, p: &LoadParameters, contact: Contact, 
     let width_mm = drive.tooth_width_mm();
     if let (ToothShape::FlatSided { flat_length_mm, .. }, Contact::Carrier) = (drive.parameters().tooth, contact) {
         let modulus_mpa = p.materials.contact_modulus_mpa(contact);
-        return width_mm * FlatContact::new(flat_length_mm, width_mm).compliance_mm_per_n(modulus_mpa);
+        let flat = FlatContact { length_mm: flat_length_mm, width_mm };
+        return width_mm * flat.compliance_mm_per_n(modulus_mpa);
     }
     let radius_mm = drive.parameters().tooth_radius_mm;
     let depth_mm = p.law.depth_mm(radius_mm).map_or(radius_mm, |depth_mm| *depth_mm.get(contact));

@@ -42,27 +42,16 @@ impl AsRef<Spring> for ToothState {
     }
 }
 
-/// Contribution of each contact's approach to the displacement ξ along `F_H`.
-pub(super) struct Weights(pub(super) PerContact<f64>);
-
-impl Weights {
-    pub(super) fn of(compatibility: Compatibility, sense: f64, flank: &RingFlank, center: &ToothCenter) -> Self {
-        let force_ratio = force_ratio(sense, flank, center);
-        match compatibility {
-            Compatibility::VirtualWork => Self(force_ratio),
-            // The paper's cos(γ + sβ) and s sin γ. With tan β = k tan γ the first, times F_K/F_H = cos γ/cos β, is 1 -
-            // (1 + sk) sin²γ.
-            Compatibility::Projection => {
-                let t = center.tan_pressure_angle;
-                let sin_squared = t * t / (1.0 + t * t);
-                let along_ring = 1.0 - (1.0 + sense * flank.teeth_per_wave()) * sin_squared;
-                Self(PerContact {
-                    wave_generator: 1.0,
-                    ring: along_ring / force_ratio.ring,
-                    carrier: sense * sin_squared.sqrt(),
-                })
-            }
-        }
+/// Returns the contribution of each contact's approach to the displacement ξ along `F_H` under `projection`: the paper's
+/// cos(γ + sβ) and s sin γ. With tan β = k tan γ the first, times F_K/F_H = cos γ/cos β, is 1 - (1 + sk) sin²γ.
+pub(super) fn projected_weights(sense: f64, flank: &RingFlank, center: &ToothCenter) -> PerContact<f64> {
+    let t = center.tan_pressure_angle;
+    let sin_squared = t * t / (1.0 + t * t);
+    let along_ring = 1.0 - (1.0 + sense * flank.teeth_per_wave()) * sin_squared;
+    PerContact {
+        wave_generator: 1.0,
+        ring: along_ring / force_ratio(sense, flank, center).ring,
+        carrier: sense * sin_squared.sqrt(),
     }
 }
 
@@ -82,7 +71,7 @@ pub(crate) fn force_ratio(sense: f64, flank: &RingFlank, center: &ToothCenter) -
 pub(crate) fn curvature_per_mm(drive: &Drive, center: &ToothCenter, flank: &FlankPoint) -> PerContact<f64> {
     let r = drive.parameters().tooth_radius_mm;
     PerContact {
-        wave_generator: 1.0 / r + center.cam_contact.curvature_per_mm,
+        wave_generator: 1.0 / r + center.cam_curvature_per_mm,
         ring: 1.0 / (r * flank.regularity),
         carrier: 1.0 / r,
     }

@@ -1,6 +1,6 @@
 //! A load: torque, materials, contact law, compatibility, clearances and profile modifications.
 
-use super::equilibrium::{Compatibility, Weights};
+use super::equilibrium::{Compatibility, projected_weights};
 use crate::contact::{Material, Materials, Part, PerContact};
 use crate::contact_law::ContactLaw;
 use crate::drive::{Draft, Drive, DriveParameters, ToothShape};
@@ -20,9 +20,15 @@ pub enum Torque {
     Output(f64),
 }
 
+impl Default for Torque {
+    fn default() -> Self {
+        Self::Input(20.0)
+    }
+}
+
 /// Parameters of a load. The default is 20 N·m at the wave generator, steel, Johnson's law and virtual work, without
 /// gaps and refinements.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LoadParameters {
     /// Materials of all parts.
     pub materials: Materials,
@@ -53,25 +59,6 @@ pub struct LoadParameters {
     pub allowable_stress_mpa: Option<PerContact<f64>>,
 }
 
-impl Default for LoadParameters {
-    fn default() -> Self {
-        Self {
-            materials: Materials::default(),
-            torque: Torque::Input(20.0),
-            compatibility: Compatibility::default(),
-            law: ContactLaw::default(),
-            series_compliance_mm_per_n: PerContact::default(),
-            ring_teeth_bend: false,
-            wave_generator_moves: false,
-            corner_contact: false,
-            clearance_um: PerContact::default(),
-            modification: Modification::default(),
-            carrier: CarrierRadii::default(),
-            allowable_stress_mpa: None,
-        }
-    }
-}
-
 impl LoadParameters {
     /// Returns the clearances that this drive cannot have under `projection`. Their weights are negative somewhere on
     /// the engaged flank, so more clearance would mean more load. Virtual work has no negative weights. Only `s` and
@@ -87,7 +74,10 @@ impl LoadParameters {
     /// Returns the reasons why the carrier cannot have the radii that support flats.
     pub fn carrier_violations(&self, draft: &Draft) -> Vec<Violation> {
         let set_forward_um = -self.modification.wave_generator_equidistant_um;
-        if draft.has_flats() { self.carrier.violations(draft, set_forward_um) } else { Vec::new() }
+        if !matches!(draft.parameters.tooth, ToothShape::FlatSided { .. }) {
+            return Vec::new();
+        }
+        self.carrier.violations(draft.cam_outer_mm, draft.ring.as_ref(), set_forward_um)
     }
 
     /// Returns the deviations that are impossible for the drive or under this load.
@@ -118,7 +108,7 @@ impl LoadParameters {
             return Ok(Vec::new());
         }
         // Both weights fall with the pressure angle (for s = -1 one weight is negative everywhere).
-        let weight = Weights::of(Compatibility::Projection, sense, &ring.flank, &ring.steepest_engaged()?).0;
+        let weight = projected_weights(sense, &ring.flank, &ring.steepest_engaged()?);
         Ok(gaps
             .into_iter()
             .filter(|&(contact, _)| *weight.get(contact) < 0.0)

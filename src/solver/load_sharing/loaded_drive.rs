@@ -22,7 +22,7 @@ use crate::violation::{Parameter, Violation};
 pub struct LoadedDrive<'a> {
     pub(super) drive: &'a Drive,
     pub(super) mesh: Mesh,
-    pub(super) compatibility: Compatibility,
+    pub(crate) compatibility: Compatibility,
     /// Factor from a sum over the listed teeth to the sum over all teeth.
     pub(crate) zones: f64,
     pub(super) input_torque_nmm: f64,
@@ -90,7 +90,9 @@ impl<'a> LoadedDrive<'a> {
         let mut violations = p.clearance_violations_in(drive.sense(), drive.ring_tooth())?;
         violations.extend(p.modification.violation_in(drive));
         if matches!(drive.parameters().tooth, ToothShape::FlatSided { .. }) {
-            violations.extend(p.carrier.violations_in(drive, -p.modification.wave_generator_equidistant_um));
+            let set_forward_um = -p.modification.wave_generator_equidistant_um;
+            let (cam_outer_mm, ring) = (drive.cam_outer_radius_mm(), drive.ring_tooth());
+            violations.extend(p.carrier.violations(Some(cam_outer_mm), Some(ring), set_forward_um));
         }
         let of_deviations = deviations.map(|deviations| p.deviation_violations(drive.parameters(), deviations));
         violations.extend(of_deviations.into_iter().flatten());
@@ -107,7 +109,7 @@ impl<'a> LoadedDrive<'a> {
         // in sin²γ and positive at the root, so its least value is there or at the largest γ. For flats the supported
         // length varies too.
         if p.compatibility == Compatibility::Projection {
-            loaded.state(&Place::default(), drive.steepest_engaged()?)?;
+            loaded.state(&Place::default(), drive.ring_tooth().steepest_engaged()?)?;
         }
         Ok(loaded)
     }
@@ -120,7 +122,7 @@ impl<'a> LoadedDrive<'a> {
     /// Returns the same drive over the places of one zone ([`Mesh::as_one_zone`]). One tooth at each place represents
     /// all that carry alike. If items deviate, every tooth is listed.
     pub(crate) fn as_one_zone(&self) -> Self {
-        let zones = if self.mesh.tells_items_apart() { self.zones } else { self.mesh.teeth_at_each_place() };
+        let zones = if self.mesh.tells_items_apart() { self.zones } else { self.mesh.lobes_loaded_alike() as f64 };
         Self { mesh: self.mesh.as_one_zone(), zones, ..*self }
     }
 
@@ -132,11 +134,6 @@ impl<'a> LoadedDrive<'a> {
     /// Returns its mesh, in which deviating items are distinguished.
     pub const fn mesh(&self) -> &Mesh {
         &self.mesh
-    }
-
-    /// Returns the form of compatibility.
-    pub const fn compatibility(&self) -> Compatibility {
-        self.compatibility
     }
 
     /// Returns true if the law is linear and uniform and no contact has a gap. Unit loads then only have to be scaled.
@@ -157,15 +154,12 @@ impl<'a> LoadedDrive<'a> {
 
     /// Returns the angle by which the wave generator moves a tooth at the flank's end by its distance from the axis.
     /// Returns 0 if no corner is pressed.
-    ///
-    /// # Errors
-    /// [`NotConverged`] from the path.
     pub(crate) fn distance_at_corner_rad(&self) -> Result<f64, NotConverged> {
         if self.tip_corner.is_none() {
             return Ok(0.0);
         }
         let center = self.drive.flank().locus().at(self.drive.flank_limit().position)?;
-        Ok(center.center_radius_mm / center.cam_contact.lever_arm_mm)
+        Ok(center.center_radius_mm / center.lever_arm_mm)
     }
 
     /// Returns `M0` in N·mm.

@@ -1,7 +1,10 @@
 //! State of a tooth at a position: geometry, gaps, pressure models, spring.
 
-use super::equilibrium::{Compatibility, ToothState, Weights, curvature_per_mm, force_ratio, force_ratio_at_corner};
+use super::equilibrium::{
+    Compatibility, ToothState, curvature_per_mm, force_ratio, force_ratio_at_corner, projected_weights,
+};
 use super::loaded_drive::LoadedDrive;
+use crate::SolveError;
 use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::mesh::Place;
@@ -10,7 +13,6 @@ use crate::ring::{FlankPoint, TipCorner};
 use crate::root::NotConverged;
 use crate::springs::{Gap, Spring};
 use crate::tooth::{CornerContact, Pressure};
-use crate::{SolveError, tooth};
 
 impl<'a> LoadedDrive<'a> {
     /// Returns the corner that a tooth before the flank meets first.
@@ -19,9 +21,6 @@ impl<'a> LoadedDrive<'a> {
     }
 
     /// Returns the centre of a tooth at a position, and the curvature of each of its contacts in the plane of motion.
-    ///
-    /// # Errors
-    /// [`NotConverged`] from the path.
     pub(crate) fn center_and_curvatures(
         &self,
         position: Position,
@@ -31,9 +30,6 @@ impl<'a> LoadedDrive<'a> {
     }
 
     /// Returns the pressure model of a contact of a tooth at a position.
-    ///
-    /// # Errors
-    /// As [`Self::tooth`], except for gaps.
     pub(crate) fn pressure_at(&self, position: Position, contact: Contact) -> Result<Pressure, SolveError> {
         let (center, curvature_per_mm) = self.center_and_curvatures(position)?;
         self.pressure(contact, &center, *curvature_per_mm.get(contact))
@@ -63,20 +59,15 @@ impl<'a> LoadedDrive<'a> {
         let at_corner = corner.and_then(|_| force_ratio_at_corner(sense, &center, &flank));
         let can_be_pressed = corner.is_none() || (at_corner.is_some() && !self.has_left_slot(&center));
         let force_ratio = at_corner.unwrap_or_else(|| force_ratio(sense, flank_curve, &center));
-        let weights = match corner {
-            Some(_) => force_ratio,
-            None => Weights::of(self.compatibility, sense, flank_curve, &center).0,
+        // Corners are pressed with virtual work only.
+        let weights = match self.compatibility {
+            Compatibility::VirtualWork => force_ratio,
+            Compatibility::Projection => projected_weights(sense, flank_curve, &center),
         };
         let curvature_per_mm = curvature_per_mm(self.drive, &center, &flank);
-        let places = PerContact::try_of(|contact| {
-            Ok::<_, SolveError>(tooth::Place {
-                force_ratio: *force_ratio.get(contact),
-                weight: *weights.get(contact),
-                pressure: self.pressure(contact, &center, *curvature_per_mm.get(contact))?,
-            })
-        })?;
+        let pressure = PerContact::try_of(|contact| self.pressure(contact, &center, *curvature_per_mm.get(contact)))?;
         // Without friction, displacement and torque of the wave generator have the same lever arm.
-        let arm_mm = center.cam_contact.lever_arm_mm;
+        let arm_mm = center.lever_arm_mm;
         let usually_turned = self.gaps.usually_turned(center.center_radius_mm);
         let gap = if self.gaps.is_nil() && corner.is_none() {
             None
@@ -113,7 +104,7 @@ impl<'a> LoadedDrive<'a> {
         };
         let bending =
             self.ring_bending.map_or(0.0, |ring| ring.compliance_mm_per_n(flank_curve.point(&center, &flank)));
-        let approach = self.contacts.approach(&places, bending);
+        let approach = self.contacts.approach(&force_ratio, &weights, &pressure, bending);
         if self.compatibility == Compatibility::Projection {
             let compliance_mm_per_n = approach.least_part_mm();
             if compliance_mm_per_n <= 0.0 {
@@ -125,7 +116,6 @@ impl<'a> LoadedDrive<'a> {
         // The tooth reaches this place on the flank after the common lost motion, and has its lever arm then.
         let usual_rad = usually_turned.lost_motion_rad(self.drive);
         let spring = Spring::new(arm_mm, usual_rad, decline_mm_per_rad, gap, approach);
-        let pressure = PerContact::of(|contact| places.get(contact).pressure);
         Ok(ToothState { center, flank, force_ratio, curvature_per_mm, pressure, spring })
     }
 
@@ -146,7 +136,7 @@ impl<'a> LoadedDrive<'a> {
     fn beyond_lost_motion_mm(&self, turned_rad: f64, center: &ToothCenter, seen: &FlankPoint) -> f64 {
         let t = center.tan_pressure_angle;
         let ring_arm_mm = center.center_radius_mm * seen.tan_pressure_angle / (1.0 + t * t).sqrt();
-        let of_flank_mm = self.drive.flank().teeth_per_wave() * center.cam_contact.lever_arm_mm;
+        let of_flank_mm = self.drive.flank().teeth_per_wave() * center.lever_arm_mm;
         turned_rad * (ring_arm_mm - of_flank_mm)
     }
 
@@ -168,7 +158,7 @@ impl<'a> LoadedDrive<'a> {
         let pressure = self.contacts.pressure(contact, curvature_per_mm, center_radius_mm)?;
         // Before the flank such a tooth carries no load.
         let unpressed =
-            || self.corner_at(&center.position).and(self.contacts.flat()).map(|flat| Pressure::Flat(flat.whole()));
+            || self.corner_at(&center.position).and(self.contacts.flat()).map(|flat| Pressure::Flat(flat.whole));
         pressure.or_else(unpressed).ok_or_else(|| {
             let position_deg = center.position.from_lobe_deg();
             SolveError::FlatOffCarrier { position_deg, center_radius_mm }
@@ -182,9 +172,6 @@ impl<'a> LoadedDrive<'a> {
 
     /// Returns the pressure at the middle of each contact of a tooth, integrated along its path over the part. Wear
     /// follows from it (docs/explanation/theory.md section 10.4).
-    ///
-    /// # Errors
-    /// [`NotConverged`] from the ellipse, [`SolveError::FlatOffCarrier`] if a flat-sided tooth has left its slot.
     pub(crate) fn line_load_n_per_mm(
         &self,
         center: &ToothCenter,

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector2;
 
+use crate::cam::ToothCenter;
 use crate::losses::{LoadedTooth, Mechanism};
 
 /// Rolling element of a bearing. Its life falls with the third power of the load with balls, with the power 10/3 with
@@ -96,8 +97,9 @@ impl Mechanism {
         }
         teeth.iter().fold(Vector2::zeros(), |load, tooth| {
             // φ = ψ + γ
-            let lobe_rad = 2.0 * PI * f64::from(tooth.lobe) / f64::from(self.lobes);
-            let (sin, cos) = (tooth.position_rad + tooth.tan_pressure_angle.atan() + lobe_rad).sin_cos();
+            let lobe_rad = 2.0 * PI * f64::from(tooth.lobe) / f64::from(self.drive.lobes());
+            let ToothCenter { position, tan_pressure_angle, .. } = tooth.center;
+            let (sin, cos) = (position.from_lobe_rad + tan_pressure_angle.atan() + lobe_rad).sin_cos();
             load - tooth.force_n.wave_generator * Vector2::new(cos, sin)
         })
     }

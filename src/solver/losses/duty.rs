@@ -1,14 +1,5 @@
-//! Friction losses over the load points of a duty cycle (docs/explanation/theory.md section 10.5), with the averaging
-//! rule of each quantity.
-//!
-//! | quantity | over the points of a duty |
-//! |---|---|
-//! | power lost | mean over time: energies add |
-//! | efficiency | energy out over energy in, so the loss ratio is weighted by the power without friction |
-//! | wear | mean over time *at each place* of a part: depths add where they are, so peaks at different places do not |
-//! | bearing's life | loads by revolutions and the life's exponent; then the mean speed |
-//! | forces, stresses, p·v, wind-up | the worst point: no other point reduces it |
-//! | torque capacity | none: it does not depend on the load |
+//! Friction losses over the load points of a duty cycle. Section 10.5 of docs/explanation/theory.md has the averaging rule
+//! of each quantity.
 
 use std::f64::consts::PI;
 
@@ -241,7 +232,7 @@ impl DutySweep<'_> {
         forces: Option<&RadialForces>,
         losses: &mut Losses,
     ) -> Cost {
-        let mechanism = Mechanism::of_sweep(self.drive, sweep);
+        let mechanism = Mechanism { mesh: sweep.mesh, ..Mechanism::of(self.drive) };
         let turning_rad_per_s = input_speed_rpm.map(|speed_rpm| mechanism.turning_rad_per_s(speed_rpm));
         Cost {
             input_torque_nm: load.input_torque_nm(self.drive),
@@ -364,7 +355,7 @@ impl Costs<'_> {
             parameters.friction.first_order_error(mechanism, mechanism.loss_share(Fixed::Ring, loss_ratio));
         let hardest = &points[hardest];
         LossTotals {
-            efficiency: efficiency.into(),
+            efficiency: Efficiencies { ring_fixed: efficiency.driven, ring_fixed_back_driven: efficiency.back_driven },
             self_locking: efficiency.is_self_locking(),
             efficiency_error,
             is_within_measured_range,

@@ -111,7 +111,7 @@ impl Friction {
     /// (docs/explanation/theory.md section 10.6, `tests/reference/friction.py ranges`).
     pub fn first_order_error(&self, mechanism: &Mechanism, loss_share: f64) -> FirstOrderError {
         let of_bearing =
-            self.bearing().map_or(0.0, |bearing| bearing.coefficient * bearing.radius_mm / mechanism.race_radius_mm);
+            self.bearing().map_or(0.0, |bearing| bearing.coefficient * bearing.radius_mm / mechanism.race_radius_mm());
         let coefficient = self.coefficient();
         let largest = coefficient.iter().map(|(_, &coefficient)| coefficient).fold(of_bearing, f64::max);
         let on_race = if mechanism.tooth_spins { ERROR_ON_RACE } else { ERROR_ON_RACE_WITHOUT_SPIN };

@@ -1,6 +1,5 @@
 //! Losses over a period, from the teeth of a sweep at each input angle.
 
-use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
 use crate::gaps::{Deviations, Gaps};
@@ -10,7 +9,7 @@ use crate::losses::wear::{WearParameters, WornPlace};
 use crate::losses::{Friction, LoadedTooth, Mechanism, Turning, mean_over_period};
 use crate::mesh::PlacedTooth;
 use crate::position::{Position, half_lobe_rad};
-use crate::ring::{FlankPoint, TipCorner};
+use crate::ring::TipCorner;
 use crate::root::NotConverged;
 use crate::springs::WindUp;
 use crate::sweep::mean::means;
@@ -77,13 +76,6 @@ pub struct Losses {
     pub wear: Option<Wear>,
 }
 
-impl Mechanism {
-    /// Returns the mechanism of a drive for the teeth that a sweep lists.
-    pub fn of_sweep(drive: &Drive, sweep: &Sweep) -> Self {
-        Self { tells_items_apart: sweep.mesh.tells_items_apart(), ..Self::of(drive) }
-    }
-}
-
 impl Losses {
     /// Returns the losses over the sweep of this drive under this load, with the wear at these parameters.
     ///
@@ -117,7 +109,7 @@ impl Losses {
         wear: Option<&WearParameters>,
         stop: &dyn Stop,
     ) -> Result<Self, SolveError> {
-        let mechanism = Mechanism::of_sweep(drive, sweep);
+        let mechanism = Mechanism { mesh: sweep.mesh, ..Mechanism::of(drive) };
         // If the wave generator moves under its teeth, their lever arms differ from those at the positions of the
         // states.
         let input_torque_nmm = 1e3 * load.input_torque_nm(drive);
@@ -132,8 +124,7 @@ impl Losses {
         let mut mm_per_hour = PerContact::of(|_| Vec::new());
         let mut of_race = Vec::new();
         at_each_input_angle(drive, states, stop, |input_angle_deg, teeth| {
-            let loaded_teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
-            let turning = mechanism.turning(friction, &loaded_teeth);
+            let turning = mechanism.turning(friction, teeth);
             ratios.push((input_angle_deg, LossByPlace::of_turning(&turning, input_torque_nmm)));
             race_mm_per_rad.push(turning.race_mm_per_rad);
             for slip in &turning.teeth {
@@ -142,8 +133,8 @@ impl Losses {
             }
             if let Some((parameters, loaded)) = &wear {
                 let mut on_race = 0.0;
-                for (ToothOfState { center, flank, loaded: tooth }, slip) in teeth.iter().zip(&turning.teeth) {
-                    let line_load = loaded.line_load_n_per_mm(center, flank, &tooth.force_n)?;
+                for (tooth, slip) in teeth.iter().zip(&turning.teeth) {
+                    let line_load = loaded.line_load_n_per_mm(&tooth.center, &tooth.flank, &tooth.force_n)?;
                     let depth = mechanism.wear_mm_per_hour(friction, parameters, tooth, slip, &line_load);
                     on_race += depth.wave_generator;
                     push(&mut mm_per_hour, &depth);
@@ -183,25 +174,19 @@ impl Losses {
         friction: &Friction,
         stop: &dyn Stop,
     ) -> Result<Self, SolveError> {
-        let loaded = if deviations.is_nil() {
-            LoadedDrive::new(drive, load)?
-        } else {
-            LoadedDrive::deviating(drive, load, deviations)?
-        };
-        let mechanism = Mechanism { tells_items_apart: loaded.mesh().tells_items_apart(), ..Mechanism::of(drive) };
+        let loaded = LoadedDrive::deviating(drive, load, deviations)?;
+        let mechanism = Mechanism { mesh: *loaded.mesh(), ..Mechanism::of(drive) };
         let input_torque_nmm = 1e3 * load.input_torque_nm(drive);
         let corner = TipCorner::of(drive.ring_tooth())?;
         let mut listed = Vec::new();
         let work_over_torque =
             |placed: &[PlacedTooth], teeth: &[ToothState], wind_up: &WindUp| -> Result<[f64; 4], SolveError> {
                 listed.clear();
-                for (PlacedTooth { lobe, .. }, tooth) in placed.iter().zip(teeth) {
+                for (&PlacedTooth { lobe, .. }, tooth) in placed.iter().zip(teeth) {
+                    let &ToothState { center, flank, .. } = tooth;
+                    let is_at_corner = corner.is_some_and(|corner| corner.is_before_flank(&center.position));
                     let force_n = loaded.forces_n(tooth, wind_up)?;
-                    let at_corner = corner.filter(|corner| corner.is_before_flank(&tooth.center.position));
-                    listed.push(LoadedTooth {
-                        corner: at_corner.map(|corner| corner.seen_from(&tooth.center)),
-                        ..LoadedTooth::new(*lobe, &tooth.center, &tooth.flank, force_n)
-                    });
+                    listed.push(LoadedTooth { lobe, center, flank, is_at_corner, force_n });
                 }
                 let LossByPlace { wave_generator, ring, carrier, bearing } =
                     LossByPlace::of_turning(&mechanism.turning(friction, &listed), input_torque_nmm);
@@ -304,7 +289,7 @@ impl BearingLoad {
         losses: &Losses,
         forces: &RadialForces,
     ) -> Option<Self> {
-        let speed_ratio = |at: usize| losses.race_mm_per_rad[at].abs() / mechanism.race_radius_mm;
+        let speed_ratio = |at: usize| losses.race_mm_per_rad[at].abs() / mechanism.race_radius_mm();
         let input_angle_deg = &sweep.input_angles.input_angle_deg;
         let (mut loads, mut turned_deg) = (Vec::with_capacity(2 * input_angle_deg.len()), 0.0);
         for at in 1..input_angle_deg.len() {
@@ -348,7 +333,7 @@ impl RadialForces {
         sweep: &Sweep,
         stop: &dyn Stop,
     ) -> Result<Option<Self>, SolveError> {
-        let mechanism = Mechanism::of_sweep(drive, sweep);
+        let mechanism = Mechanism { mesh: sweep.mesh, ..Mechanism::of(drive) };
         if mechanism.lobes_loaded_alike() > 1 {
             return Ok(None);
         }
@@ -356,7 +341,7 @@ impl RadialForces {
         let gaps = Gaps::new(drive, &p.clearance_um, p.modification, Some(deviations));
         let mut forces = Self::default();
         at_each_input_angle(drive, &sweep.states, stop, |input_angle_deg, teeth| {
-            let mut teeth: Vec<_> = teeth.iter().map(|tooth| tooth.loaded).collect();
+            let mut teeth = teeth.to_vec();
             if p.wave_generator_moves {
                 let wind_up_rad = sweep.input_angles.wind_up_deg[forces.force_n.len()].to_radians();
                 for tooth in &mut teeth {
@@ -381,14 +366,16 @@ fn passed_by(
     gaps: &Gaps<'_>,
     wind_up_rad: f64,
 ) -> Result<LoadedTooth, NotConverged> {
-    let center_at = |position_rad: f64| {
-        let from_lobe_rad = position_rad.abs().min(half_lobe_rad(drive.lobes()));
-        drive.flank().locus().at(Position::from_lobe(from_lobe_rad, drive.lobes()))
-    };
-    let usual = gaps.usually_turned(center_at(tooth.position_rad)?.center_radius_mm);
-    let position_rad = tooth.position_rad - (wind_up_rad - gaps.lost_motion_rad() - usual.lost_motion_rad(drive));
-    let center = center_at(position_rad)?;
-    Ok(LoadedTooth { position_rad, tan_pressure_angle: center.tan_pressure_angle.copysign(position_rad), ..*tooth })
+    let usual = gaps.usually_turned(tooth.center.center_radius_mm);
+    let moved_rad = wind_up_rad - gaps.lost_motion_rad() - usual.lost_motion_rad(drive);
+    // Negative beyond the middle of the lobe.
+    let position_rad = tooth.center.position.from_lobe_rad - moved_rad;
+    let from_lobe_rad = position_rad.abs().min(half_lobe_rad(drive.lobes()));
+    let mut center = drive.flank().locus().at(Position::from_lobe(from_lobe_rad, drive.lobes()))?;
+    // Only the direction of the radial force reads it.
+    center.position.from_lobe_rad = position_rad;
+    center.tan_pressure_angle = center.tan_pressure_angle.copysign(position_rad);
+    Ok(LoadedTooth { center, ..*tooth })
 }
 
 /// Visits the input angles of a sweep. An angle may occur twice where a tooth enters: without the tooth and with it.
@@ -397,7 +384,7 @@ fn at_each_input_angle(
     drive: &Drive,
     states: &States,
     stop: &dyn Stop,
-    mut each: impl FnMut(f64, &[ToothOfState]) -> Result<(), SolveError>,
+    mut each: impl FnMut(f64, &[LoadedTooth]) -> Result<(), SolveError>,
 ) -> Result<(), SolveError> {
     let mut teeth = Vec::new();
     let corner = TipCorner::of(drive.ring_tooth())?;
@@ -418,13 +405,6 @@ fn at_each_input_angle(
     Ok(())
 }
 
-/// Tooth of a state, with its contact points.
-struct ToothOfState {
-    center: ToothCenter,
-    flank: FlankPoint,
-    loaded: LoadedTooth,
-}
-
 /// Returns the tooth of a state. Its position is stored in degrees. Near the valley the rounding is about 1e-14 rad,
 /// where its load is negligible.
 fn tooth_of(
@@ -432,7 +412,7 @@ fn tooth_of(
     corner: Option<&TipCorner>,
     states: &States,
     state: usize,
-) -> Result<ToothOfState, NotConverged> {
+) -> Result<LoadedTooth, NotConverged> {
     let lobes = drive.lobes();
     let from_lobe_rad = states.position_deg[state].to_radians().min(half_lobe_rad(lobes));
     let center = drive.flank().locus().at(Position::from_lobe(from_lobe_rad, lobes))?;
@@ -442,6 +422,5 @@ fn tooth_of(
     let flank = corner.unwrap_or_else(|| drive.flank().at(&center));
     let force_n = PerContact::of(|contact| states.force_n.get(contact)[state]);
     let lobe = states.lobe.get(state).copied().unwrap_or_default();
-    let loaded = LoadedTooth { corner, ..LoadedTooth::new(lobe, &center, &flank, force_n) };
-    Ok(ToothOfState { center, flank, loaded })
+    Ok(LoadedTooth { lobe, center, flank, is_at_corner: corner.is_some(), force_n })
 }

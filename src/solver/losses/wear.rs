@@ -3,6 +3,7 @@
 
 use std::f64::consts::PI;
 
+use crate::cam::ToothCenter;
 use crate::contact::{Contact, PerContact};
 use crate::losses::{Friction, LoadedTooth, Mechanism, ToothSlip, secant};
 use crate::sweep::Peak;
@@ -44,11 +45,12 @@ impl Mechanism {
     /// Returns the speed of the contact point over each part, per radian: `ρ_H dφ` on the cam, `(1 + rκ) d/(k cos β)`
     /// on the ring, `dd` in the slot.
     pub fn advance_mm_per_rad(&self, tooth: &LoadedTooth) -> PerContact<f64> {
-        let (k, d, t) = (self.ring_teeth_per_wave(), tooth.center_radius_mm, tooth.tan_pressure_angle);
+        let ToothCenter { center_radius_mm: d, tan_pressure_angle: t, cam_curvature_per_mm, .. } = tooth.center;
+        let (k, r) = (self.drive.flank().teeth_per_wave(), self.drive.parameters().tooth_radius_mm);
         PerContact {
             // dφ/dψ = d/((r + ρ_H) cos γ), and ρ_H/(r + ρ_H) = 1/(1 + r/ρ_H), which holds on a straight or hollow cam too.
-            wave_generator: d * secant(t) / (1.0 + self.tooth_radius_mm * tooth.cam_curvature_per_mm),
-            ring: tooth.regularity * d * secant(k * t) / k,
+            wave_generator: d * secant(t) / (1.0 + r * cam_curvature_per_mm),
+            ring: tooth.flank.regularity * d * secant(k * t) / k,
             carrier: d * t,
         }
     }
@@ -57,11 +59,11 @@ impl Mechanism {
     /// cam once per revolution relative to the carrier. A point of the ring is passed with every m-th lobe, a point of
     /// a slot with every lobe.
     fn passes_per_rad(&self) -> PerContact<f64> {
-        let (lobes, installed) = (f64::from(self.lobes), f64::from(self.installed));
+        let ([_, ring_teeth, lobes], installed) = (self.counts(), self.drive.parameters().installed as f64);
         PerContact {
             wave_generator: installed / (2.0 * PI),
             // ω_HK = ω_HS Z_G/Z_K, U lobes, and one in Z_G/Z'_G brings a tooth.
-            ring: lobes * installed / (2.0 * PI * f64::from(self.ring_teeth)),
+            ring: lobes * installed / (2.0 * PI * ring_teeth),
             carrier: lobes / (2.0 * PI),
         }
     }
@@ -92,7 +94,7 @@ impl Mechanism {
             }
             let depth_mm_per_rad = match (contact, friction.bearing()) {
                 (Contact::WaveGenerator, Some(_)) => {
-                    self.zones_in_torque() * area_mm2_per_rad / (2.0 * PI * self.race_radius_mm)
+                    self.mesh.zones_in_torque() * area_mm2_per_rad / (2.0 * PI * self.race_radius_mm())
                 }
                 _ => area_mm2_per_rad / advance.get(contact) * passes.get(contact),
             };

@@ -51,7 +51,7 @@ pub(super) fn flank_point(flank: &RingFlank, position: Position) -> Result<Point
 pub(super) struct Piece {
     /// Elements around the piece, the material on their left. The last [`KNOTS`] are loaded by a tooth, from the
     /// flank's end to the root, which is loaded in the middle of its space.
-    elements: Vec<Element>,
+    pub(super) elements: Vec<Element>,
 }
 
 impl Piece {
@@ -102,10 +102,6 @@ impl Piece {
         }
         elements.rotate_left(first_pressed + KNOTS);
         Ok(Self { elements })
-    }
-
-    pub(super) fn elements(&self) -> &[Element] {
-        &self.elements
     }
 
     /// Returns the elements that a tooth loads.

@@ -11,9 +11,6 @@ use crate::sweep::fast::lanes::{VECTOR, angle, fused, ln};
 
 /// Returns the displacement of the ring in excess of a half-plane, under a force on each of the loaded elements and
 /// along it.
-///
-/// # Errors
-/// [`NotConverged`] if the system has no solution.
 pub(super) fn further_than_half_plane(piece: &Piece, poissons_ratio: f64) -> Result<[f64; KNOTS], NotConverged> {
     let singular = NotConverged { what: "bending of the ring's teeth", iterations: 1, bracket_width: f64::INFINITY };
     pulp::Arch::new().dispatch(Solving { piece, poissons_ratio }).ok_or(singular)
@@ -29,7 +26,7 @@ impl WithSimd for Solving<'_> {
 
     #[inline(always)]
     fn with_simd<V: Simd>(self, _: V) -> Self::Output {
-        let points = Points::of(self.piece.elements());
+        let points = Points::of(&self.piece.elements);
         let mut system = assembled::<V>(self.piece, &points, self.poissons_ratio);
         if !system.eliminate::<V>() {
             return None;
@@ -37,7 +34,7 @@ impl WithSimd for Solving<'_> {
         let pressed = self.piece.pressed();
         let mut give = [0.0; KNOTS];
         for (force, element) in pressed.iter().enumerate() {
-            let [x, y] = system.solution(force, 2 * (points.count - KNOTS + force));
+            let [x, y] = system.solution(force, 2 * (self.piece.elements.len() - KNOTS + force));
             give[force] = -(element.outward.x * x + element.outward.y * y);
         }
         Some(give)
@@ -46,7 +43,6 @@ impl WithSimd for Solving<'_> {
 
 /// Midpoints of all elements with their outward directions, and flags of the fixed ones, in columns of whole vectors.
 struct Points {
-    count: usize,
     x: Vec<f64>,
     y: Vec<f64>,
     outward_x: Vec<f64>,
@@ -65,7 +61,6 @@ impl Points {
             column
         };
         Self {
-            count: elements.len(),
             x: column(|element| element.middle.x, FAR),
             y: column(|element| element.middle.y, FAR),
             outward_x: column(|element| element.outward.x, 0.0),
@@ -74,77 +69,60 @@ impl Points {
         }
     }
 
-    /// Returns the length with padding.
+    /// Returns the number of points with padding.
     fn len(&self) -> usize {
         self.x.len()
     }
 }
 
-/// A vector at each point.
-struct Vectors {
-    x: Vec<f64>,
-    y: Vec<f64>,
-}
+/// The components x and y of a vector at each point.
+type Vectors = [Vec<f64>; 2];
 
-/// Effect of a vector on an element at each point, for both of its components.
-struct Influence {
-    of_x: Vectors,
-    of_y: Vectors,
-}
-
-impl Vectors {
-    fn new(len: usize) -> Self {
-        Self { x: vec![0.0; len], y: vec![0.0; len] }
-    }
-}
-
-impl Influence {
-    fn new(len: usize) -> Self {
-        Self { of_x: Vectors::new(len), of_y: Vectors::new(len) }
-    }
-
-    fn columns_mut(&mut self) -> [&mut [f64]; 4] {
-        [&mut self.of_x.x, &mut self.of_x.y, &mut self.of_y.x, &mut self.of_y.y]
-    }
-}
+/// Vectors at each point by an element's vector along x, then by one along y.
+type Influence = [Vectors; 2];
 
 #[inline(always)]
 fn assembled<V: Simd>(piece: &Piece, points: &Points, poissons_ratio: f64) -> System {
-    let elements = piece.elements();
+    let elements = &piece.elements;
     let len = points.len();
+    let vectors = || -> Vectors { [vec![0.0; len], vec![0.0; len]] };
     let first_pressed = elements.len() - KNOTS;
     // Added to the half-plane under each force: on free faces the negative of its tractions, on fixed ones of its
     // displacements. The loaded face needs no correction.
     let mut added = Vec::with_capacity(KNOTS);
     for (force, element) in piece.pressed().iter().enumerate() {
-        let mut vectors = Vectors::new(len);
+        let mut vectors = vectors();
         opposite_of_half_plane::<V>(element, points, poissons_ratio, &mut vectors);
-        (vectors.x[first_pressed + force], vectors.y[first_pressed + force]) = (0.0, 0.0);
+        for component in &mut vectors {
+            component[first_pressed + force] = 0.0;
+        }
         added.push(vectors);
     }
     let mut system = System::new(elements.len(), len);
-    let (mut by_traction, mut by_motion) = (Influence::new(len), Influence::new(len));
+    let [mut by_traction, mut by_motion]: [Influence; 2] = [[vectors(), vectors()], [vectors(), vectors()]];
     for (at, element) in elements.iter().enumerate() {
         influence::<V>(element, points, poissons_ratio, &mut by_traction, &mut by_motion);
-        by_motion.of_x.x[at] += 0.5;
-        by_motion.of_y.y[at] += 0.5;
-        for column in by_traction.columns_mut().into_iter().chain(by_motion.columns_mut()) {
+        let [[x_along_x, _], [_, y_along_y]] = &mut by_motion;
+        x_along_x[at] += 0.5;
+        y_along_y[at] += 0.5;
+        for column in by_traction.iter_mut().chain(&mut by_motion).flatten() {
             column[elements.len()..].fill(0.0);
         }
         let (unknown, known, sign) =
             if element.is_held { (&by_traction, &by_motion, -1.0) } else { (&by_motion, &by_traction, 1.0) };
-        for (column, of) in [&unknown.of_x, &unknown.of_y].into_iter().enumerate() {
+        for (column, [of_x, of_y]) in unknown.iter().enumerate() {
             let (x, y) = system.columns[2 * at + column].split_at_mut(len);
             for i in 0..len {
-                (x[i], y[i]) = (sign * of.x[i], sign * of.y[i]);
+                (x[i], y[i]) = (sign * of_x[i], sign * of_y[i]);
             }
         }
-        for (force, added) in added.iter().enumerate() {
-            let (by_x, by_y) = (sign * added.x[at], sign * added.y[at]);
+        let [[xx, yx], [xy, yy]] = known;
+        for (force, [added_x, added_y]) in added.iter().enumerate() {
+            let (by_x, by_y) = (sign * added_x[at], sign * added_y[at]);
             let (x, y) = system.columns[2 * elements.len() + force].split_at_mut(len);
             for i in 0..len {
-                x[i] = fused::<V>(by_x, known.of_x.x[i], fused::<V>(by_y, known.of_y.x[i], x[i]));
-                y[i] = fused::<V>(by_x, known.of_x.y[i], fused::<V>(by_y, known.of_y.y[i], y[i]));
+                x[i] = fused::<V>(by_x, xx[i], fused::<V>(by_y, xy[i], x[i]));
+                y[i] = fused::<V>(by_x, yx[i], fused::<V>(by_y, yy[i], y[i]));
             }
         }
     }
@@ -169,8 +147,8 @@ fn influence<V: Simd>(
     let (a, o, half) = (element.along, element.outward, element.half);
     let len = points.len();
     let (point_x, point_y) = (&points.x[..len], &points.y[..len]);
-    let [txx, tyx, txy, tyy] = by_traction.columns_mut().map(|column| &mut column[..len]);
-    let [mxx, myx, mxy, myy] = by_motion.columns_mut().map(|column| &mut column[..len]);
+    let [[txx, tyx], [txy, tyy]] = by_traction.each_mut().map(|of| of.each_mut().map(|column| &mut column[..len]));
+    let [[mxx, myx], [mxy, myy]] = by_motion.each_mut().map(|of| of.each_mut().map(|column| &mut column[..len]));
     for i in 0..len {
         let (dx, dy) = (point_x[i] - element.middle.x, point_y[i] - element.middle.y);
         let (x, y) = (dx * a.x + dy * a.y, dx * o.x + dy * o.y);
@@ -227,7 +205,7 @@ fn opposite_of_half_plane<V: Simd>(element: &Element, points: &Points, poissons_
     let len = points.len();
     let (point_x, point_y) = (&points.x[..len], &points.y[..len]);
     let (outward_x, outward_y, held) = (&points.outward_x[..len], &points.outward_y[..len], &points.held[..len]);
-    let (to_x, to_y) = (&mut vectors.x[..len], &mut vectors.y[..len]);
+    let [to_x, to_y] = vectors.each_mut().map(|component| &mut component[..len]);
     for i in 0..len {
         let (dx, dy) = (point_x[i] - element.middle.x, point_y[i] - element.middle.y);
         let (depth, aside) = (dx * inward.x + dy * inward.y, dx * across.x + dy * across.y);

@@ -29,15 +29,10 @@ pub(crate) struct Gap {
     pub(crate) lost_motion_rad: f64,
 }
 
-/// Rotation of the wave generator that closes a gap, and the arm at that point.
-struct Closing {
-    rad: f64,
-    arm_mm: f64,
-}
-
 impl Gap {
-    /// Returns the closing rotation of a tooth whose arm applies after this common lost motion.
-    fn closing(&self, arm_mm: f64, usual_rad: f64, arm_decline_mm_per_rad: f64) -> Closing {
+    /// Returns the rotation of the wave generator that closes the gap of a tooth whose arm applies after this common
+    /// lost motion, and the arm at that point.
+    fn closing(&self, arm_mm: f64, usual_rad: f64, arm_decline_mm_per_rad: f64) -> (f64, f64) {
         // If the common lost motion exceeds the gap, the rotation is negative, at most back to where a growing arm
         // begins.
         let begin_rad = |arm_mm: f64| {
@@ -48,9 +43,9 @@ impl Gap {
         let has_ended = arm_mm == 0.0 && arm_decline_mm_per_rad >= 0.0;
         let way_rad = turned_rad(arm_mm, arm_decline_mm_per_rad, self.along_mm).max(begin_rad(arm_mm));
         if has_ended || self.along_mm == f64::INFINITY || way_rad == f64::INFINITY {
-            return Closing { rad: f64::INFINITY, arm_mm };
+            return (f64::INFINITY, arm_mm);
         }
-        Closing { rad: lost_motion_rad + way_rad, arm_mm: arm_mm - arm_decline_mm_per_rad * way_rad }
+        (lost_motion_rad + way_rad, arm_mm - arm_decline_mm_per_rad * way_rad)
     }
 }
 
@@ -65,8 +60,8 @@ impl Spring {
         gap: Option<Gap>,
         approach: Approach,
     ) -> Self {
-        let Closing { rad: closing_rad, arm_mm } =
-            gap.map_or(Closing { rad: 0.0, arm_mm }, |gap| gap.closing(arm_mm, usual_rad, arm_decline_mm_per_rad));
+        let (closing_rad, arm_mm) =
+            gap.map_or((0.0, arm_mm), |gap| gap.closing(arm_mm, usual_rad, arm_decline_mm_per_rad));
         Self { arm_mm, arm_decline_mm_per_rad, closing_rad, approach }
     }
 

@@ -64,9 +64,6 @@ impl Moment {
 
 /// Returns the input angles of a sweep to a tolerance, in order, by lap. If items are alike, one lap represents all. At
 /// a jump of the loads the same angle is listed twice: first without the tooth that enters, then with it.
-///
-/// # Errors
-/// As [`search()`].
 pub(crate) fn moments(
     loaded: &LoadedDrive<'_>,
     load: &LoadCase,
@@ -77,10 +74,9 @@ pub(crate) fn moments(
     let mesh = *loaded.mesh();
     let laps = if mesh.tells_items_apart() { mesh.laps() } else { 1 };
     let resolution = tolerance.relative().clamp(FINEST_RESOLUTION, COARSEST_RESOLUTION);
-    let allowable_mpa = load.parameters().allowable_stress_mpa;
     let pieces = || (0..laps).flat_map(|lap| Piece::of(loaded, lap));
     let in_columns = match looking {
-        Looking::Fast => fast::moments(loaded, pieces(), tolerance, resolution, allowable_mpa, stop)?,
+        Looking::Fast => fast::moments(loaded, pieces(), tolerance, resolution, load, stop)?,
         Looking::Plain => None,
     };
     let found = match in_columns {
@@ -95,7 +91,7 @@ pub(crate) fn moments(
     let mut by_lap = vec![Vec::new(); usize::try_from(laps).unwrap_or(usize::MAX)];
     // If lever arms vary, a tooth is pressed before it is lifted, because it is then behind the valley.
     let loads_jump = mesh.loads_jump_at_entry() || load.parameters().wave_generator_moves;
-    let without_load = if tolerance.looks_without_load() && loaded.has_gaps() {
+    let without_load = if tolerance.looks_without_load && loaded.has_gaps() {
         unloaded::extremes(&PlainLook::new(loaded, load, stop), pieces(), tolerance, stop)?
     } else {
         Vec::new()

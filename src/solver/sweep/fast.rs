@@ -1,6 +1,6 @@
 //! Sweep at equally spaced input angles, evaluated for many states at a time.
 //!
-//! The formulas are those of the plain path ([`crate::locus`], [`crate::ring`], [`crate::load_sharing`]), which remains
+//! The formulas are those of the plain path ([`crate::cam`], [`crate::ring`], [`crate::load_sharing`]), which remains
 //! the reference. Here they process columns instead of one tooth, without branches and calls, so that the compiler can
 //! vectorise them. Three properties make that possible:
 //!
@@ -36,6 +36,7 @@ use std::iter::zip;
 use gaps::GapColumns;
 use lanes::arctangent_terms;
 use laps::{LapTeeth, Laps, Layout, whole};
+use loads::Totals;
 use moments::FastLook;
 use pressures::Pressures;
 use pulp::Simd;
@@ -43,106 +44,83 @@ use shape::Shape;
 use sharing::Sharing;
 use sinks::{ColumnSink, PeakSink, Sink};
 use tile::{Run, Tile, TileSize};
-use unit::Compliance;
+use unit::Unit;
 
 use crate::contact::{Contact, PerContact};
 use crate::load_sharing::{LoadCase, LoadedDrive};
 use crate::mesh::{Mesh, Samples};
 use crate::position::Position;
-use crate::sweep::columns::{self, ContactPeaks, Peak, Sweep, SweepPeaks, TorqueBalance, TorqueCapacity};
+use crate::sweep::columns::{self, ContactPeaks, Peak, PeaksSoFar, Sweep, SweepPeaks, TorqueCapacity};
 use crate::sweep::points::{Points, Tolerance};
 use crate::sweep::search::{Best, Found, Piece, search};
 use crate::{SolveError, Stop};
 
-/// Returns the sweep and its capacity for an allowable stress. Returns none if the plain path has to compute it: for
-/// laws without columns, possible interference, and drives beyond the limits.
-///
-/// # Errors
-/// As [`columns::checked`].
+/// Returns the sweep, and its capacity if the load has an allowable stress. Returns none if the plain path has to compute
+/// it: for laws without columns, possible interference, and drives beyond the limits.
 pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
     load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<Sweep>, SolveError> {
-    let allowable_mpa = load.parameters().allowable_stress_mpa;
     let one_zone = loaded.as_one_zone();
-    let Some(kernel) = Kernel::new(&one_zone, allowable_mpa) else { return Ok(None) };
+    let Some(kernel) = Kernel::new(&one_zone, load) else { return Ok(None) };
     let laps = Laps::new(loaded.mesh(), samples);
-    let mut sink = ColumnSink::new(&laps);
-    let Some(filled) = kernel.fill(&one_zone, &laps, stop, &mut sink)? else { return Ok(None) };
-    let mut sweep = sink.sweep(loaded.drive(), filled);
-    sweep.torque_capacity = sweep.torque_capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &sweep.peaks));
-    kernel.complete(loaded, load, &mut sweep.peaks)?;
+    let mut sink = ColumnSink::new(loaded.drive(), &laps);
+    let Some(totals) = kernel.fill(&laps, stop, &mut sink)? else { return Ok(None) };
+    let mut sweep = sink.sweep(&totals);
+    sweep.torque_capacity = kernel.complete(&mut sweep.peaks, sweep.torque_capacity)?;
     columns::checked(sweep, loaded, Points::Samples(samples)).map(Some)
 }
 
 /// Returns the peaks of the same sweep without its states, for zones that are alike; none in the cases of [`sweep`].
-///
-/// # Errors
-/// As [`sweep`].
 pub(crate) fn peaks(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
     load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<SweepPeaks>, SolveError> {
-    let allowable_mpa = load.parameters().allowable_stress_mpa;
-    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
-    let (laps, mut sink) = (Laps::new(loaded.mesh(), samples), PeakSink::new());
-    let Some(Filled { torque_balance_residual, torque_capacity }) = kernel.fill(loaded, &laps, stop, &mut sink)? else {
-        return Ok(None);
-    };
-    columns::check("torque balance", torque_balance_residual)?;
-    let mut peaks = sink.peaks(loaded.drive(), torque_balance_residual);
-    peaks.torque_capacity = torque_capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &peaks.contacts));
-    kernel.complete(loaded, load, &mut peaks.contacts)?;
-    Ok(Some(peaks))
+    let Some(kernel) = Kernel::new(loaded, load) else { return Ok(None) };
+    let mut sink = PeakSink::new(loaded.drive());
+    let Some(totals) = kernel.fill(&Laps::new(loaded.mesh(), samples), stop, &mut sink)? else { return Ok(None) };
+    columns::check("torque balance", totals.torque_balance_residual)?;
+    let mut contacts = sink.contact_peaks();
+    let torque_capacity = kernel.complete(&mut contacts, totals.torque_capacity)?;
+    Ok(Some(sink.angles.peaks(contacts, torque_capacity, totals.torque_balance_residual)))
 }
 
 /// Returns the moments of a sweep to a tolerance over these pieces, with linear interpolation true to a resolution.
 /// Returns none in the cases of [`sweep`].
-///
-/// # Errors
-/// As [`search()`].
 pub(crate) fn moments(
     loaded: &LoadedDrive<'_>,
     pieces: impl Iterator<Item = Piece>,
     tolerance: Tolerance,
     resolution: f64,
-    allowable_mpa: Option<PerContact<f64>>,
+    load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<Found>, SolveError> {
     let one_zone = loaded.as_one_zone();
-    let Some(kernel) = Kernel::new(&one_zone, allowable_mpa) else { return Ok(None) };
-    let layout = kernel.layout(loaded.mesh());
-    let size = kernel.tile_size(loaded.mesh(), layout);
-    let mut arena = vec![0.0; size.doubles()];
-    let mut look = FastLook::new(&kernel, &one_zone, (*loaded.mesh(), layout), &size, &mut arena, stop);
+    let Some(kernel) = Kernel::new(&one_zone, load) else { return Ok(None) };
+    let mut arena = Vec::new();
+    let mut look = FastLook::new(&kernel, *loaded.mesh(), &mut arena, stop);
     search(&look.searched(), pieces, tolerance, Some(resolution), stop, |fractions, seen| look.look(fractions, seen))
 }
 
 /// Returns the true peaks to a tolerance; none in the cases of [`sweep`].
-///
-/// # Errors
-/// As [`search()`], and as [`sweep`].
 pub(crate) fn true_peaks(
     loaded: &LoadedDrive<'_>,
     tolerance: Tolerance,
     load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<SweepPeaks>, SolveError> {
-    let allowable_mpa = load.parameters().allowable_stress_mpa;
-    let Some(kernel) = Kernel::new(loaded, allowable_mpa) else { return Ok(None) };
-    let mesh = *loaded.mesh();
-    let size = kernel.tile_size(&mesh, Layout::PLAIN);
-    let mut arena = vec![0.0; size.doubles()];
-    let mut look = FastLook::new(&kernel, loaded, (mesh, Layout::PLAIN), &size, &mut arena, stop);
+    let Some(kernel) = Kernel::new(loaded, load) else { return Ok(None) };
+    let (mesh, mut arena) = (*loaded.mesh(), Vec::new());
+    let mut look = FastLook::new(&kernel, mesh, &mut arena, stop);
     let pieces = Piece::of(loaded, 0);
     let found = search(&look.searched(), pieces, tolerance, None, stop, |fractions, seen| look.look(fractions, seen))?;
     let Some(Found { seen, best }) = found else { return Ok(None) };
-    columns::check("torque balance", look.torque_balance_residual)?;
-    let drive = loaded.drive();
+    let FastLook { angles, totals, .. } = look;
+    columns::check("torque balance", totals.torque_balance_residual)?;
     let peak = |Best { value, piece, moment, tooth }| {
         let (seen, fraction) = (&seen[piece], seen[piece].fractions[moment]);
         let position = seen.piece.position(&mesh, tooth as u64 + 1, fraction);
@@ -151,41 +129,26 @@ pub(crate) fn true_peaks(
     let mut contacts = PerContact::of(|contact| {
         let force = contact as usize;
         let hardest: Best = best[force + 3];
-        let force_n = seen[hardest.piece].load(hardest.moment, force, hardest.tooth);
-        ContactPeaks::of_line(peak(best[force]), peak(hardest), force_n, drive.tooth_width_mm())
+        let force_at_stress_n = seen[hardest.piece].load(hardest.moment, force, hardest.tooth);
+        let peaks = PeaksSoFar { force_n: peak(best[force]), stress_mpa: peak(hardest), force_at_stress_n };
+        peaks.of_line(loaded.drive().tooth_width_mm())
     });
-    let torque_capacity = look.capacity.or_else(|| kernel.in_proportion(loaded, allowable_mpa, &contacts));
-    kernel.complete(loaded, load, &mut contacts)?;
-    Ok(Some(look.angles.peaks(contacts, torque_capacity, look.torque_balance_residual)))
+    let torque_capacity = kernel.complete(&mut contacts, totals.torque_capacity)?;
+    Ok(Some(angles.peaks(contacts, torque_capacity, totals.torque_balance_residual)))
 }
 
-/// Sweep in the form that `pulp` needs. It is compiled once for each instruction set, and the best one is chosen at run
-/// time. All functions called must be inlined, otherwise they would not be vectorised.
-struct Vectorised<'a, K> {
-    kernel: &'a Kernel,
+/// A drive under a load, with its constants.
+struct Kernel<'a> {
     loaded: &'a LoadedDrive<'a>,
-    laps: &'a Laps,
-    stop: &'a dyn Stop,
-    sink: &'a mut K,
-}
-
-impl<K: Sink> pulp::WithSimd for Vectorised<'_, K> {
-    type Output = Result<Option<Filled>, SolveError>;
-
-    #[inline(always)]
-    fn with_simd<V: Simd>(self, _: V) -> Self::Output {
-        self.kernel.sweep::<V, K>(self.loaded, self.laps, self.stop, self.sink)
-    }
-}
-
-/// Constants of a drive under a load.
-struct Kernel {
+    load: &'a LoadCase,
     shape: Shape,
     r: f64,
     ring_teeth_per_wave: f64,
     teeth_per_wave: f64,
-    law: Law,
-    gaps: Option<GapColumns>,
+    unit: Unit,
+    /// Load sharing; none for a linear law without gaps, whose unit loads are scaled by one factor for each input angle.
+    sharing: Option<Sharing>,
+    gaps: Option<GapColumns<'a>>,
     pressures: Pressures,
     /// `E*/(π L1)` of each contact.
     hertz: PerContact<f64>,
@@ -196,102 +159,71 @@ struct Kernel {
     allowable_mpa: Option<PerContact<f64>>,
 }
 
-/// Results of a sweep that are not in its sink.
-struct Filled {
-    torque_balance_residual: f64,
-    torque_capacity: Option<TorqueCapacity>,
-}
-
-/// Load-sharing method.
-enum Law {
-    /// A linear law without gaps: unit loads are those of a rotation of 1, to be scaled by one factor for each input
-    /// angle.
-    Linear(Compliance),
-    /// Any other law: unit loads are those of 1 N at the wave generator.
-    Sharing(Sharing),
-}
-
-impl Law {
-    /// Returns true if all loads are proportional, whatever the torque.
-    const fn is_in_proportion(&self) -> bool {
-        match self {
-            Self::Linear(_) => true,
-            Self::Sharing(sharing) => sharing.is_in_proportion(),
-        }
-    }
-}
-
-impl Kernel {
-    fn new(loaded: &LoadedDrive<'_>, allowable_mpa: Option<PerContact<f64>>) -> Option<Self> {
-        let law = match Sharing::new(loaded)? {
-            Sharing::Linear(law) if loaded.is_linear() => {
-                Law::Linear(Compliance::new(&law.power.compliance_mm_per_n, loaded))
-            }
-            sharing => Law::Sharing(sharing),
+impl<'a> Kernel<'a> {
+    fn new(loaded: &'a LoadedDrive<'a>, load: &'a LoadCase) -> Option<Self> {
+        let (unit, sharing) = match Sharing::new(loaded)? {
+            Sharing::Linear(law) if loaded.is_linear() => (Unit::rotation(&law.compliance_mm_per_n, loaded), None),
+            sharing => (Unit::NEWTON, Some(sharing)),
         };
         let drive = loaded.drive();
         let pressures = Pressures::new(loaded)?;
         let r = drive.parameters().tooth_radius_mm;
-        let (shape, ratios) = Shape::new(drive.flank().locus().cam(), r)?;
-        Some(Self {
+        let (shape, ratios) = Shape::new(&drive.flank().cam, r)?;
+        let mut kernel = Self {
+            loaded,
+            load,
             shape,
             r,
             ring_teeth_per_wave: drive.flank().teeth_per_wave(),
             teeth_per_wave: drive.teeth_per_wave(),
+            unit,
+            sharing,
             gaps: GapColumns::new(loaded),
             hertz: pressures.hertz(loaded),
             pressures,
             cam_terms: arctangent_terms(ratios.wave_generator)?,
             ring_terms: arctangent_terms(ratios.ring)?,
-            allowable_mpa: allowable_mpa.filter(|_| !law.is_in_proportion()),
-            law,
-        })
+            allowable_mpa: None,
+        };
+        kernel.allowable_mpa = load.parameters().allowable_stress_mpa.filter(|_| !kernel.is_in_proportion());
+        Some(kernel)
     }
 
-    /// Returns the capacity if all loads are proportional (docs/explanation/theory.md section 4.7): that of the stress
-    /// nearest to its limit.
-    fn in_proportion(
-        &self,
-        loaded: &LoadedDrive<'_>,
-        allowable_mpa: Option<PerContact<f64>>,
-        peaks: &PerContact<ContactPeaks>,
-    ) -> Option<TorqueCapacity> {
-        let (exponents, input_torque_nm) = (self.pressures.stress_exponents(), 1e-3 * loaded.input_torque_nmm());
-        allowable_mpa.map(|allowable_mpa| {
-            TorqueCapacity::in_proportion(loaded.drive(), input_torque_nm, &allowable_mpa, peaks, exponents)
-        })
+    /// Returns true if all loads are proportional, whatever the torque.
+    fn is_in_proportion(&self) -> bool {
+        self.sharing.as_ref().is_none_or(|sharing| sharing.is_power_law() && self.gaps.is_none())
     }
 
-    /// Adds to the peaks the data of contacts other than line contacts.
+    fn torque_of_zone_nmm(&self) -> f64 {
+        self.loaded.input_torque_nmm() / self.loaded.zones
+    }
+
+    /// Adds to the peaks the data of contacts other than line contacts. Returns the torque capacity, which follows from
+    /// the peaks if all loads are proportional (docs/explanation/theory.md section 4.7): that of the stress nearest to
+    /// its limit.
     fn complete(
         &self,
-        loaded: &LoadedDrive<'_>,
-        load: &LoadCase,
         peaks: &mut PerContact<ContactPeaks>,
-    ) -> Result<(), SolveError> {
+        torque_capacity: Option<TorqueCapacity>,
+    ) -> Result<Option<TorqueCapacity>, SolveError> {
+        let (drive, load) = (self.loaded.drive(), self.load.parameters());
+        let torque_capacity = torque_capacity.or_else(|| {
+            let input_torque_nm = 1e-3 * self.loaded.input_torque_nmm();
+            let exponents = self.pressures.stress_exponents();
+            load.allowable_stress_mpa.map(|allowable_mpa| {
+                TorqueCapacity::in_proportion(drive, input_torque_nm, &allowable_mpa, peaks, exponents)
+            })
+        });
         if !matches!(self.pressures, Pressures::Lines) {
-            let lobes = loaded.drive().lobes();
             for contact in Contact::all() {
                 let peak = peaks.get_mut(contact);
-                let position = Position::from_lobe(peak.stress_mpa.position_deg.to_radians(), lobes);
-                let pressure = loaded.pressure_at(position, contact)?;
+                let position = Position::from_lobe(peak.stress_mpa.position_deg.to_radians(), drive.lobes());
+                let pressure = self.loaded.pressure_at(position, contact)?;
                 let force_n = pressure.force_n(peak.stress_mpa.value);
-                *peak = peak.of_pressure(&pressure, force_n, &load.parameters().materials, contact);
+                *peak = peak.of_pressure(&pressure, force_n, &load.materials, contact);
             }
         }
-        Ok(())
-    }
-
-    /// Returns the size of tiles for arbitrary input angles.
-    fn tile_size(&self, mesh: &Mesh, layout: Layout) -> TileSize {
-        let places = mesh.teeth_in_mesh().max / mesh.listed_at_each_place();
-        self.with_room(TileSize::anywhere(layout.at_each_place * whole(places)))
-    }
-
-    /// Returns the size with the memory that the law needs.
-    fn with_room(&self, size: TileSize) -> TileSize {
-        let are_unlike = self.gaps.as_ref().is_some_and(GapColumns::are_unlike);
-        size.with(matches!(self.law, Law::Sharing(_)), are_unlike)
+        Ok(torque_capacity)
     }
 
     /// Returns true if gaps belong to individual items.
@@ -306,35 +238,34 @@ impl Kernel {
         Layout { at_each_place, apart }
     }
 
-    /// Fills the sink with the best vectors of this machine. Returns the largest torque residual, or none if the plain
-    /// path is needed.
-    fn fill(
-        &self,
-        loaded: &LoadedDrive<'_>,
-        laps: &Laps,
-        stop: &dyn Stop,
-        sink: &mut impl Sink,
-    ) -> Result<Option<Filled>, SolveError> {
-        pulp::Arch::new().dispatch(Vectorised { kernel: self, loaded, laps, stop, sink })
+    /// Fills the sink with the best vectors of this machine. Returns none if the plain path is needed.
+    fn fill(&self, laps: &Laps, stop: &dyn Stop, sink: &mut impl Sink) -> Result<Option<Totals>, SolveError> {
+        pulp::Arch::new().dispatch(Vectorised { kernel: self, laps, stop, sink })
     }
+}
 
-    /// Runs the sweep over the superposed zones of a drive, whose positions repeat in each lap.
+/// Sweep over the superposed zones of a drive, whose positions repeat in each lap, in the form that `pulp` needs. It is
+/// compiled once for each instruction set, and the best one is chosen at run time. All functions called must be inlined,
+/// otherwise they would not be vectorised.
+struct Vectorised<'a, K> {
+    kernel: &'a Kernel<'a>,
+    laps: &'a Laps,
+    stop: &'a dyn Stop,
+    sink: &'a mut K,
+}
+
+impl<K: Sink> pulp::WithSimd for Vectorised<'_, K> {
+    type Output = Result<Option<Totals>, SolveError>;
+
     #[inline(always)]
-    fn sweep<V: Simd, K: Sink>(
-        &self,
-        loaded: &LoadedDrive<'_>,
-        laps: &Laps,
-        stop: &dyn Stop,
-        sink: &mut K,
-    ) -> Result<Option<Filled>, SolveError> {
-        let (mesh, layout) = (*loaded.mesh(), self.layout(laps.mesh()));
-        let size = self.with_room(TileSize::of(&mesh, laps.of_lap, layout.at_each_place, K::COLUMNS));
+    fn with_simd<V: Simd>(self, _: V) -> Self::Output {
+        let Self { kernel, laps, stop, sink } = self;
+        let (mesh, layout) = (*kernel.loaded.mesh(), kernel.layout(&laps.mesh));
+        let size = TileSize::of(kernel, laps.of_lap, layout.at_each_place, K::COLUMNS);
         let mut arena = vec![0.0; size.doubles()];
         let step_rad = laps.stride as f64 * mesh.phase_step_rad(laps.of_lap);
-        let mut tile = Tile::new(&mut arena, &size, step_rad, self.pressures.stress_exponents());
-        let balance = TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm());
-        let mut filled = Filled { torque_balance_residual: 0.0, torque_capacity: None };
-        let mut lap_teeth = LapTeeth::default();
+        let mut tile = Tile::new(&mut arena, &size, step_rad, kernel.pressures.stress_exponents());
+        let (mut totals, mut lap_teeth) = (Totals::new(kernel.loaded), LapTeeth::default());
         for residue in 0..laps.stride {
             let mut first = residue;
             while first < laps.of_lap.count() {
@@ -342,7 +273,7 @@ impl Kernel {
                 run.lay_pattern(&mut tile);
                 for start in run.starts() {
                     run.place(start, &mut tile);
-                    if !self.unit_loads::<V, K>(&mut tile) || !self.prepare::<V>(loaded, run.teeth, &mut tile) {
+                    if !kernel.unit_loads::<V, K>(&mut tile) {
                         return Ok(None);
                     }
                     let mut is_shared = false;
@@ -351,47 +282,31 @@ impl Kernel {
                             return Err(SolveError::Stopped);
                         }
                         if laps.are_listed() {
-                            lap_teeth.list(laps.mesh(), layout, run.places(), lap);
+                            lap_teeth.list(&laps.mesh, layout, run.places, lap);
                         }
-                        if laps.is_end(lap) {
+                        if lap == laps.count {
                             tile.count = run.teeth;
                         }
                         let sample = laps.sample(lap, start);
-                        let rows = tile.count / run.teeth;
                         if !is_shared {
-                            if !self.close(laps.mesh(), &lap_teeth, run.teeth, &mut tile) {
+                            if !kernel.loads::<V>(&laps.mesh, &lap_teeth, &mut tile) {
                                 return Ok(None);
                             }
-                            let Some(limit) = self.loads::<V>(loaded, run.teeth, &mut tile, |_, _| ()) else {
-                                return Ok(None);
-                            };
-                            if let Some(limit) = limit {
-                                let limit_deg = laps.input_angle_deg(sample + limit.row as u64);
-                                filled.torque_capacity =
-                                    least(filled.torque_capacity, limit.capacity(loaded, limit_deg));
-                            }
-                            filled.torque_balance_residual =
-                                Self::residual(&balance, rows, &mut tile, filled.torque_balance_residual);
-                            is_shared = !self.tells_items_apart();
+                            let Some(limit) = kernel.limit::<V>(&mut tile) else { return Ok(None) };
+                            let angle_deg = |row: usize| laps.input_angle_deg(sample + row as u64);
+                            totals.take(kernel.loaded, &mut tile, limit.as_ref(), angle_deg);
+                            is_shared = !kernel.tells_items_apart();
                         }
+                        let rows = tile.rows();
                         for (angle_deg, sample) in zip(&mut tile.row_input_angle_deg[..rows], sample..) {
                             *angle_deg = laps.input_angle_deg(sample);
                         }
-                        sink.take(loaded.drive(), &mut tile, run.teeth, sample, &lap_teeth);
+                        sink.take(&mut tile, sample, &lap_teeth);
                     }
                 }
                 first = run.next();
             }
         }
-        Ok(Some(filled))
+        Ok(Some(totals))
     }
-}
-
-/// Returns the smaller of two capacities, and the first of equal ones, independent of the order of evaluation.
-fn least(before: Option<TorqueCapacity>, capacity: TorqueCapacity) -> Option<TorqueCapacity> {
-    let is_first = |before: &TorqueCapacity| {
-        let order = before.input_torque_nm.total_cmp(&capacity.input_torque_nm);
-        order.then(before.input_angle_deg.total_cmp(&capacity.input_angle_deg)).is_le()
-    };
-    Some(before.filter(is_first).unwrap_or(capacity))
 }

@@ -15,7 +15,7 @@ use crate::{SolveError, Stop};
 const FIRST_STRETCHES: u32 = 4;
 
 /// Enough for the finest tolerance if the values are not rounded more than that.
-const ENOUGH_MOMENTS: u64 = 4096;
+const ENOUGH_MOMENTS: usize = 4096;
 
 /// If twice as many moments leave this share of the error, further refinement does not help.
 const STAGNATION: f64 = 0.75;
@@ -26,21 +26,18 @@ const FINEST: f64 = 1e-10;
 /// Largest number of moments in each lap.
 const MOST_MOMENTS: u32 = 100_000;
 
-/// Several quantities at a moment.
-type Values<const N: usize> = [f64; N];
-
 /// Interval of a lap with the values at its ends, its middle and its quarters.
 struct Stretch<const N: usize> {
     piece: usize,
     start: f64,
     end: f64,
-    values: [Values<N>; 5],
+    values: [[f64; N]; 5],
     /// Difference of Simpson's rule over the whole and over the halves, summed over all quantities.
     error: f64,
 }
 
 impl<const N: usize> Stretch<N> {
-    fn new(piece: usize, start: f64, end: f64, values: [Values<N>; 5]) -> Self {
+    fn new(piece: usize, start: f64, end: f64, values: [[f64; N]; 5]) -> Self {
         let mut stretch = Self { piece, start, end, values, error: 0.0 };
         // For smooth curves the error over the halves is 1/15 of the difference. Kinks are not smooth: count the full
         // difference.
@@ -86,18 +83,17 @@ impl<const N: usize> Eq for Stretch<N> {}
 pub(crate) fn means<const N: usize>(
     loaded: &LoadedDrive<'_>,
     tolerance: f64,
-    mut of: impl FnMut(&[PlacedTooth], &[ToothState], &WindUp) -> Result<Values<N>, SolveError>,
+    mut of: impl FnMut(&[PlacedTooth], &[ToothState], &WindUp) -> Result<[f64; N], SolveError>,
     stop: &dyn Stop,
-) -> Result<Values<N>, SolveError> {
+) -> Result<[f64; N], SolveError> {
     let mesh = *loaded.mesh();
     let laps = if mesh.tells_items_apart() { mesh.laps() } else { 1 };
     let pieces: Vec<_> = (0..laps).flat_map(|lap| Piece::of(loaded, lap)).collect();
-    let (mut placed, mut teeth, mut looked) = (Vec::new(), Vec::new(), 0_u64);
+    let (mut placed, mut teeth) = (Vec::new(), Vec::new());
     let mut look = |piece: usize, fraction: f64| {
         if stop.stopped() {
             return Err(SolveError::Stopped);
         }
-        looked += 1;
         let piece = &pieces[piece];
         placed.clear();
         placed.extend(Moment::of(piece, fraction).placed(&mesh, piece.lap));
@@ -105,7 +101,7 @@ pub(crate) fn means<const N: usize>(
         for PlacedTooth { place, position, .. } in &placed {
             teeth.push(loaded.tooth_at(place, *position)?);
         }
-        Ok((of(&placed, &teeth, &loaded.wind_up(&teeth)?)?, looked))
+        of(&placed, &teeth, &loaded.wind_up(&teeth)?)
     };
     let mut stretches = BinaryHeap::new();
     for (at, piece) in pieces.iter().enumerate() {
@@ -115,7 +111,7 @@ pub(crate) fn means<const N: usize>(
         };
         let mut values = Vec::new();
         for step in 0..=4 * FIRST_STRETCHES {
-            values.push(look(at, fraction(step))?.0);
+            values.push(look(at, fraction(step))?);
         }
         for stretch in 0..FIRST_STRETCHES {
             let first = 4 * stretch;
@@ -123,7 +119,8 @@ pub(crate) fn means<const N: usize>(
             stretches.push(Stretch::new(at, fraction(first), fraction(first + 4), values));
         }
     }
-    let mut checked: Option<(u64, f64)> = None;
+    let (enough, most) = (ENOUGH_MOMENTS * pieces.len(), MOST_MOMENTS as usize * pieces.len());
+    let (mut before, mut error_before) = (enough / 2, f64::INFINITY);
     // The sum is recomputed regularly, so that rounding errors do not accumulate.
     loop {
         let error = errors(&stretches);
@@ -139,8 +136,8 @@ pub(crate) fn means<const N: usize>(
                 break;
             };
             let at = |quarter: f64| start + 0.25 * quarter * (end - start);
-            let ((first, _), (second, _)) = (look(piece, at(0.5))?, look(piece, at(1.5))?);
-            let ((third, _), (fourth, looked)) = (look(piece, at(2.5))?, look(piece, at(3.5))?);
+            let (first, second) = (look(piece, at(0.5))?, look(piece, at(1.5))?);
+            let (third, fourth) = (look(piece, at(2.5))?, look(piece, at(3.5))?);
             let halves = [
                 Stretch::new(piece, start, at(2.0), [low, first, lower, second, middle]),
                 Stretch::new(piece, at(2.0), end, [middle, third, upper, fourth, high]),
@@ -150,18 +147,18 @@ pub(crate) fn means<const N: usize>(
                 excess += half.error;
                 stretches.push(half);
             }
+            // Each piece begins with one moment, and each of its intervals has four more.
+            let looked = pieces.len() + 4 * stretches.len();
             // Twice as many moments at least halve the error of kinks. If they do not, the values themselves are
             // rounded.
-            let enough = ENOUGH_MOMENTS * pieces.len() as u64;
-            let (before, error_before) = checked.unwrap_or((enough / 2, f64::INFINITY));
             if looked >= 2 * before {
                 let error = errors(&stretches);
                 if error > STAGNATION * error_before {
                     return Ok(total(&stretches).map(|area| area / laps as f64));
                 }
-                checked = Some((looked, error));
+                (before, error_before) = (looked, error);
             }
-            if looked > u64::from(MOST_MOMENTS).saturating_mul(pieces.len() as u64) {
+            if looked > most {
                 let not_converged =
                     NotConverged { what: "mean over the period", iterations: MOST_MOMENTS, bracket_width: error };
                 return Err(not_converged.into());
@@ -176,6 +173,6 @@ fn errors<const N: usize>(stretches: &BinaryHeap<Stretch<N>>) -> f64 {
 }
 
 /// Returns the integrals over all intervals.
-fn total<const N: usize>(stretches: &BinaryHeap<Stretch<N>>) -> Values<N> {
+fn total<const N: usize>(stretches: &BinaryHeap<Stretch<N>>) -> [f64; N] {
     std::array::from_fn(|n| stretches.iter().map(|stretch| stretch.area(n)).sum())
 }

@@ -1,6 +1,6 @@
 //! Sweep state by state: the reference for the fast path, and the fallback for drives it does not support.
 
-use crate::contact::{Materials, PerContact};
+use crate::contact::PerContact;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState, TorqueLimit};
 use crate::mesh::{PlacedTooth, Samples};
 use crate::root::NotConverged;
@@ -15,9 +15,6 @@ use crate::tooth::Pressure;
 use crate::{SolveError, Stop};
 
 /// Runs the sweep.
-///
-/// # Errors
-/// As [`sweep`](crate::sweep::sweep()).
 pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
     load: &LoadCase,
@@ -26,14 +23,11 @@ pub(crate) fn sweep(
     stop: &dyn Stop,
 ) -> Result<Sweep, SolveError> {
     let mesh = *loaded.mesh();
-    let mut columns = Growing::new(loaded, load.parameters().allowable_stress_mpa);
+    let mut columns = Growing::new(loaded, load, stop);
     match points {
         Points::Samples(samples) => {
             columns.begin(mesh.state_count(samples), mesh.last_sample(samples) + 1);
             for sample in 0..=mesh.last_sample(samples) {
-                if stop.stopped() {
-                    return Err(SolveError::Stopped);
-                }
                 columns.add(mesh.input_angle_deg(sample, samples), mesh.placed_at(sample, samples))?;
             }
         }
@@ -42,7 +36,7 @@ pub(crate) fn sweep(
             // Each place was counted once. It may represent several listed teeth, and occurs in every lap.
             let places = by_lap.iter().flatten().map(|moment| moment.places()).sum::<u64>();
             let listed = places * (mesh.laps() / by_lap.len() as u64) * mesh.listed_at_each_place();
-            let limit = tolerance.max_states();
+            let limit = tolerance.max_states;
             if listed > limit {
                 return Err(SolveError::TooManyStates { limit });
             }
@@ -51,21 +45,15 @@ pub(crate) fn sweep(
             for (lap, moments) in (0..mesh.laps()).zip(by_lap.iter().cycle()) {
                 // A lap begins at the end of the one before.
                 for moment in &moments[usize::from(lap > 0)..] {
-                    if stop.stopped() {
-                        return Err(SolveError::Stopped);
-                    }
                     columns.add((lap as f64 + moment.fraction) * lap_deg, moment.placed(&mesh, lap))?;
                 }
             }
         }
     }
-    columns.finish(points, &load.parameters().materials)
+    columns.finish(points)
 }
 
 /// Returns the peaks of a sweep over equal intervals, keeping only some states at a time.
-///
-/// # Errors
-/// As [`sweep`](crate::sweep::sweep()).
 pub(crate) fn peaks(
     loaded: &LoadedDrive<'_>,
     load: &LoadCase,
@@ -74,17 +62,14 @@ pub(crate) fn peaks(
 ) -> Result<SweepPeaks, SolveError> {
     const STATES_AT_A_TIME: u64 = 1024;
     let mesh = *loaded.mesh();
-    let mut columns = Growing::new(loaded, load.parameters().allowable_stress_mpa);
+    let mut columns = Growing::new(loaded, load, stop);
     for sample in 0..=mesh.last_sample(samples) {
-        if stop.stopped() {
-            return Err(SolveError::Stopped);
-        }
         if sample == 0 || columns.states.len() as u64 >= STATES_AT_A_TIME {
             columns.begin(2 * STATES_AT_A_TIME, STATES_AT_A_TIME);
         }
         columns.add(mesh.input_angle_deg(sample, samples), mesh.placed_at(sample, samples))?;
     }
-    let contacts = columns.contact_peaks(&load.parameters().materials)?;
+    let contacts = columns.contact_peaks()?;
     check("torque balance", columns.torque_balance_residual)?;
     Ok(columns.angles.peaks(contacts, columns.torque_capacity, columns.torque_balance_residual))
 }
@@ -92,7 +77,8 @@ pub(crate) fn peaks(
 /// Sweep that is built input angle by input angle.
 struct Growing<'a> {
     loaded: &'a LoadedDrive<'a>,
-    allowable_stress_mpa: Option<PerContact<f64>>,
+    load: &'a LoadCase,
+    stop: &'a dyn Stop,
     states: States,
     input_angles: InputAngles,
     torque_capacity: Option<TorqueCapacity>,
@@ -109,10 +95,11 @@ struct Growing<'a> {
 }
 
 impl<'a> Growing<'a> {
-    fn new(loaded: &'a LoadedDrive<'a>, allowable_stress_mpa: Option<PerContact<f64>>) -> Self {
+    fn new(loaded: &'a LoadedDrive<'a>, load: &'a LoadCase, stop: &'a dyn Stop) -> Self {
         Self {
             loaded,
-            allowable_stress_mpa,
+            load,
+            stop,
             states: States::default(),
             input_angles: InputAngles::default(),
             torque_capacity: None,
@@ -137,6 +124,9 @@ impl<'a> Growing<'a> {
 
     /// Appends the states of the teeth in mesh at one input angle.
     fn add(&mut self, input_angle_deg: f64, placed: impl Iterator<Item = PlacedTooth>) -> Result<(), SolveError> {
+        if self.stop.stopped() {
+            return Err(SolveError::Stopped);
+        }
         self.teeth.clear();
         for PlacedTooth { number, lobe, place, position, position_deg } in placed {
             let tooth = self.loaded.tooth_at(&place, position);
@@ -154,19 +144,13 @@ impl<'a> Growing<'a> {
         let wind_up_deg = wind_up.rotation_rad().to_degrees();
         self.input_angles.push(input_angle_deg, wind_up_deg, stiffness, loaded_teeth);
         self.angles.see(wind_up_deg, stiffness, u64::from(loaded_teeth));
-        if let Some(allowable_stress_mpa) = &self.allowable_stress_mpa {
+        if let Some(allowable_stress_mpa) = &self.load.parameters().allowable_stress_mpa {
             let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa)?;
             let input_torque_nm = 1e-3 * limit.input_torque_nmm;
             if self.torque_capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
-                let output_torque_nm = input_torque_nm * self.loaded.drive().teeth_per_wave();
                 let TorqueLimit { contact, turns_past_teeth, law_end, .. } = limit;
-                self.torque_capacity = Some(TorqueCapacity {
-                    input_torque_nm,
-                    output_torque_nm,
-                    limited_by: contact.into(),
-                    turns_past_teeth,
-                    input_angle_deg,
-                });
+                let capacity = TorqueCapacity::new(self.loaded.drive(), input_torque_nm, contact, input_angle_deg);
+                self.torque_capacity = Some(TorqueCapacity { turns_past_teeth, ..capacity });
                 self.law_end = law_end;
             }
         }
@@ -193,6 +177,8 @@ impl<'a> Growing<'a> {
             let stress_mpa = self.loaded.stress_mpa(tooth, &force_n);
             for (contact, &stress_mpa) in stress_mpa.iter() {
                 let (peaks, force_n) = (self.peaks.get_mut(contact), *force_n.get(contact));
+                states.force_n.get_mut(contact).push(force_n);
+                states.stress_mpa.get_mut(contact).push(stress_mpa);
                 let peak = |value| Peak { value, input_angle_deg, position_deg };
                 // The first of equal values counts.
                 if force_n > peaks.force_n.value {
@@ -203,12 +189,10 @@ impl<'a> Growing<'a> {
                     *self.pressures.get_mut(contact) = Some(*tooth.pressure.get(contact));
                 }
             }
-            states.force_n.push(force_n);
-            states.stress_mpa.push(stress_mpa);
 
             let sin_ring = point.tan_pressure_angle * point.cos_pressure_angle;
             // If lever arms vary, all three moments use the arm after wind-up.
-            let arm_mm = center.cam_contact.lever_arm_mm;
+            let arm_mm = center.lever_arm_mm;
             let turned_mm = tooth.spring.turned_arm_mm(&wind_up.rotation) - arm_mm;
             let moved_nmm = zones * force_n.wave_generator * turned_mm;
             torque_nmm.wave_generator += zones * force_n.wave_generator * arm_mm + moved_nmm;
@@ -229,10 +213,11 @@ impl<'a> Growing<'a> {
     }
 
     /// Returns the peaks of each contact, or an error if the law ends before the torque capacity.
-    fn contact_peaks(&self, materials: &Materials) -> Result<PerContact<ContactPeaks>, SolveError> {
+    fn contact_peaks(&self) -> Result<PerContact<ContactPeaks>, SolveError> {
         if let Some(error) = &self.law_end {
             return Err(error.clone());
         }
+        let materials = &self.load.parameters().materials;
         Ok(PerContact::of(|contact| {
             let peaks = self.peaks.get(contact);
             let of_line = peaks.of_line(self.loaded.drive().tooth_width_mm());
@@ -242,10 +227,10 @@ impl<'a> Growing<'a> {
         }))
     }
 
-    fn finish(self, points: Points, materials: &Materials) -> Result<Sweep, SolveError> {
+    fn finish(self, points: Points) -> Result<Sweep, SolveError> {
         let sweep = Sweep {
             mesh: *self.loaded.mesh(),
-            peaks: self.contact_peaks(materials)?,
+            peaks: self.contact_peaks()?,
             states: self.states,
             input_angles: self.input_angles,
             torque_capacity: self.torque_capacity,
@@ -253,13 +238,5 @@ impl<'a> Growing<'a> {
             period_closure_residual: 0.0,
         };
         checked(sweep, self.loaded, points)
-    }
-}
-
-impl PerContact<Vec<f64>> {
-    fn push(&mut self, values: PerContact<f64>) {
-        self.wave_generator.push(values.wave_generator);
-        self.ring.push(values.ring);
-        self.carrier.push(values.carrier);
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::contact::PerContact;
 use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
-use crate::mesh::Mesh;
 use crate::sweep::search::{LOADS, Piece, SearchedDrive, Seen};
 use crate::{SolveError, Stop};
 
@@ -10,8 +9,7 @@ use crate::{SolveError, Stop};
 pub(crate) struct PlainLook<'a> {
     /// With one tooth at each place of the mesh, which represents all that carry alike. If items deviate, with every
     /// tooth.
-    loaded: LoadedDrive<'a>,
-    mesh: Mesh,
+    pub(crate) loaded: LoadedDrive<'a>,
     allowable_stress_mpa: Option<PerContact<f64>>,
     has_gaps: bool,
     stop: &'a dyn Stop,
@@ -22,51 +20,35 @@ impl<'a> PlainLook<'a> {
         let mesh = *loaded.mesh();
         let tells_items_apart = mesh.tells_items_apart();
         Self {
-            loaded: if tells_items_apart { *loaded } else { loaded.with_zones(mesh.teeth_at_each_place()) },
-            mesh,
+            loaded: if tells_items_apart { *loaded } else { loaded.with_zones(mesh.lobes_loaded_alike() as f64) },
             allowable_stress_mpa: load.parameters().allowable_stress_mpa,
             has_gaps: loaded.has_gaps() || tells_items_apart,
             stop,
         }
     }
 
-    /// Returns the drive, with the number of teeth that each evaluated tooth represents.
-    pub(crate) const fn loaded(&self) -> &LoadedDrive<'a> {
-        &self.loaded
-    }
-
-    /// Returns the teeth of a piece, place by place.
-    ///
-    /// # Errors
-    /// Errors of a tooth, with the input angle.
+    /// Returns the teeth of a piece, place by place. Errors of a tooth have the input angle.
     pub(crate) fn teeth(&self, piece: &Piece, fraction: f64) -> Result<Vec<ToothState>, SolveError> {
         if self.stop.stopped() {
             return Err(SolveError::Stopped);
         }
-        let lap_deg = self.mesh.sweep_period_deg() / self.mesh.laps() as f64;
-        let input_angle_deg = (piece.lap as f64 + fraction) * lap_deg;
-        self.teeth_by_place(piece, fraction).map_err(|error| error.at_input_angle(input_angle_deg))
-    }
-
-    fn teeth_by_place(&self, piece: &Piece, fraction: f64) -> Result<Vec<ToothState>, SolveError> {
-        let mesh = &self.mesh;
-        if !mesh.tells_items_apart() {
-            let places = 1..=piece.places;
-            return places.map(|place| self.loaded.tooth(piece.position(mesh, place, fraction))).collect();
-        }
+        let mesh = self.loaded.mesh();
         let position = |place| piece.position(mesh, place, fraction);
-        let mut placed: Vec<_> = mesh.placed_between(1..=piece.places, piece.lap, position).collect();
-        // Teeth at one place keep the order of their slots.
-        placed.sort_by(|one, other| one.position.from_lobe_rad.total_cmp(&other.position.from_lobe_rad));
-        placed.iter().map(|tooth| self.loaded.tooth_at(&tooth.place, tooth.position)).collect()
+        let teeth: Result<Vec<_>, _> = if mesh.tells_items_apart() {
+            let mut placed: Vec<_> = mesh.placed_between(1..=piece.places, piece.lap, position).collect();
+            // Teeth at one place keep the order of their slots.
+            placed.sort_by(|one, other| one.position.from_lobe_rad.total_cmp(&other.position.from_lobe_rad));
+            placed.iter().map(|tooth| self.loaded.tooth_at(&tooth.place, tooth.position)).collect()
+        } else {
+            (1..=piece.places).map(|place| self.loaded.tooth(position(place))).collect()
+        };
+        let lap_deg = mesh.sweep_period_deg() / mesh.laps() as f64;
+        teeth.map_err(|error| error.at_input_angle((piece.lap as f64 + fraction) * lap_deg))
     }
 
     /// Returns what the search needs to know.
-    ///
-    /// # Errors
-    /// [`NotConverged`](crate::root::NotConverged) from the path.
     pub(crate) fn searched(&self) -> Result<SearchedDrive, SolveError> {
-        let (loaded, mesh) = (&self.loaded, &self.mesh);
+        let (loaded, mesh) = (&self.loaded, self.loaded.mesh());
         Ok(SearchedDrive {
             has_gaps: self.has_gaps,
             is_linear: loaded.is_linear(),
@@ -78,9 +60,6 @@ impl<'a> PlainLook<'a> {
     }
 
     /// Appends moments of a piece.
-    ///
-    /// # Errors
-    /// The reason why there is no answer.
     pub(crate) fn look(&self, fractions: &[f64], seen: &mut Seen) -> Result<(), SolveError> {
         let piece = seen.piece;
         for &fraction in fractions {
@@ -88,10 +67,9 @@ impl<'a> PlainLook<'a> {
             let wind_up = self.loaded.wind_up(&teeth)?;
             if self.has_gaps {
                 let rotation = wind_up.rotation;
-                let closings_rad = teeth.iter().map(|tooth| tooth.spring.closing_rad);
-                seen.push_pressed(
-                    closings_rad.map(|closing_rad| rotation.excess_rad + (rotation.closing_rad - closing_rad)),
-                );
+                let pressed_rad =
+                    |tooth: &ToothState| rotation.excess_rad + (rotation.closing_rad - tooth.spring.closing_rad);
+                seen.pressed.extend(teeth.iter().map(pressed_rad));
             }
             let per_capacity = match &self.allowable_stress_mpa {
                 Some(allowable_mpa) => 1.0 / self.loaded.torque_limit(&teeth, allowable_mpa)?.input_torque_nmm,

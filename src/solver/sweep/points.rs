@@ -66,8 +66,10 @@ impl Points {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     relative: f64,
-    max_states: u64,
-    looks_without_load: bool,
+    /// Largest number of states that may be evaluated.
+    pub(crate) max_states: u64,
+    /// True if the extremes of the wind-up without load are searched for too.
+    pub(crate) looks_without_load: bool,
 }
 
 impl Tolerance {
@@ -84,15 +86,5 @@ impl Tolerance {
     /// Returns the relative tolerance.
     pub const fn relative(&self) -> f64 {
         self.relative
-    }
-
-    /// Returns true if the extremes of the wind-up without load are searched for too.
-    pub(crate) const fn looks_without_load(&self) -> bool {
-        self.looks_without_load
-    }
-
-    /// Returns the largest number of states that may be evaluated.
-    pub const fn max_states(&self) -> u64 {
-        self.max_states
     }
 }

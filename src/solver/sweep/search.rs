@@ -134,16 +134,6 @@ pub(crate) struct Found {
     pub(crate) best: [Best; QUANTITIES],
 }
 
-struct Search {
-    tolerance: Tolerance,
-    /// Largest error of linear interpolation between the moments, over the peaks. None if only the peaks are needed.
-    lines: Option<f64>,
-    is_sought: [bool; QUANTITIES],
-    seen: Vec<Seen>,
-    best: [Best; QUANTITIES],
-    states: u64,
-}
-
 /// Searches for the largest value of every quantity. `look` appends moments of a piece, or returns false if it does not
 /// support the drive; then the result is none.
 ///
@@ -158,119 +148,82 @@ pub(crate) fn search(
     stop: &dyn Stop,
     mut look: impl FnMut(&[f64], &mut Seen) -> Result<bool, SolveError>,
 ) -> Result<Option<Found>, SolveError> {
-    let teeth = |piece: &Piece| usize::try_from(piece.places * drive.teeth_at_each_place).unwrap_or(usize::MAX);
-    let mut is_sought = [true; QUANTITIES];
-    if drive.is_in_proportion {
-        STIFFNESSES.iter().for_each(|&quantity| is_sought[quantity] = false);
-    }
-    let (mut seen, mut states) = (Vec::new(), 0_u64);
+    let limit = tolerance.max_states;
+    let mut found = Found::default();
+    let mut states = 0_u64;
     // Pieces are evaluated one by one: deviating items may need millions of laps, more than fit in memory.
     for piece in pieces {
-        let of_piece = Seen::new(piece, teeth(&piece));
-        states = states.saturating_add((of_piece.wanted.len() * of_piece.teeth) as u64);
-        if states > tolerance.max_states() {
-            return Err(SolveError::TooManyStates { limit: tolerance.max_states() });
+        let teeth = usize::try_from(piece.places * drive.teeth_at_each_place).unwrap_or(usize::MAX);
+        let of_piece = Seen::new(piece, teeth);
+        states = states.saturating_add((of_piece.wanted.len() * teeth) as u64);
+        if states > limit {
+            return Err(SolveError::TooManyStates { limit });
         }
         if stop.stopped() {
             return Err(SolveError::Stopped);
         }
-        seen.push(of_piece);
+        found.seen.push(of_piece);
     }
-    let mut search = Search { tolerance, lines, is_sought, seen, best: [Best::default(); QUANTITIES], states: 0 };
+    states = 0;
     let mut excess = 0.0;
     for round in 0..MAX_ROUNDS {
-        if !search.look(&mut look)? {
-            return Ok(None);
-        }
-        excess = search.want(round, drive);
-        let wanted: usize = search.seen.iter().map(|seen| seen.wanted.len()).sum();
-        if wanted == 0 {
-            return Ok(Some(Found { seen: search.seen, best: search.best }));
-        }
-    }
-    // The remaining excess is more than rounding only if the curves are not smooth.
-    let rounding = search.rounding(drive);
-    if excess > tolerance.relative().max(OPEN).max(rounding) {
-        return Err(NotConverged { what: "extremes of a sweep", iterations: MAX_ROUNDS, bracket_width: excess }.into());
-    }
-    Ok(Some(Found { seen: search.seen, best: search.best }))
-}
-
-impl Search {
-    /// Returns the effect of rounding of closing angles on the loads, including a bend counted several times. The
-    /// amplification is `Δφ K/M`, with M the given or the allowed torque. If teeth press against corners, Δφ is at
-    /// least [`SearchedDrive::distance_at_corner_rad`].
-    fn rounding(&self, drive: &SearchedDrive) -> f64 {
-        let [rotation_rad, stiffness_nmm_per_rad] = [LOADS, STIFFNESSES[0]].map(|quantity| self.best[quantity].value);
-        let per_torque = self.best[CAPACITY].value.max(1.0 / drive.input_torque_nmm);
-        let rotation_rad = rotation_rad.max(drive.distance_at_corner_rad);
-        ROUNDINGS * f64::EPSILON * (rotation_rad * stiffness_nmm_per_rad * per_torque)
-    }
-
-    /// Evaluates the wanted moments.
-    fn look(
-        &mut self,
-        look: &mut impl FnMut(&[f64], &mut Seen) -> Result<bool, SolveError>,
-    ) -> Result<bool, SolveError> {
-        for (piece, seen) in self.seen.iter_mut().enumerate() {
+        for (piece, seen) in found.seen.iter_mut().enumerate().filter(|(_, seen)| !seen.wanted.is_empty()) {
             let wanted = std::mem::take(&mut seen.wanted);
-            if wanted.is_empty() {
-                continue;
-            }
-            self.states += (wanted.len() * seen.teeth) as u64;
-            let limit = self.tolerance.max_states();
-            if self.states > limit {
+            states += (wanted.len() * seen.teeth) as u64;
+            if states > limit {
                 return Err(SolveError::TooManyStates { limit });
             }
             let first = seen.fractions.len();
             if !look(&wanted, seen)? {
-                return Ok(false);
+                return Ok(None);
             }
             seen.put_in_order();
-            for moment in first..seen.fractions.len() {
-                for (quantity, best) in self.best.iter_mut().enumerate() {
-                    let curves = seen.curves(quantity);
-                    let values = &seen.values(moment)[curves];
-                    let most = values.iter().fold(0.0_f64, |most, &value| most.max(value));
-                    if most > best.value {
-                        let tooth = values.iter().position(|&value| value >= most).unwrap_or(0);
-                        *best = Best { value: most, piece, moment, tooth };
-                    }
-                }
+            for (quantity, best) in found.best.iter_mut().enumerate() {
+                best.update(seen, piece, first, quantity);
             }
         }
-        Ok(true)
+        let best = found.best.map(|best| best.value);
+        excess = Judge { drive, best, relative: tolerance.relative(), lines, round }.want(&mut found.seen);
+        if found.seen.iter().all(|seen| seen.wanted.is_empty()) {
+            return Ok(Some(found));
+        }
     }
+    // The remaining excess is more than rounding only if the curves are not smooth.
+    if excess > tolerance.relative().max(OPEN).max(drive.rounding(&found.best)) {
+        return Err(NotConverged { what: "extremes of a sweep", iterations: MAX_ROUNDS, bracket_width: excess }.into());
+    }
+    Ok(Some(found))
+}
 
-    /// Records the fractions to evaluate next. Returns the relative amount by which a quantity may still rise.
-    fn want(&mut self, round: u32, drive: &SearchedDrive) -> f64 {
-        let relative = self.tolerance.relative();
-        let nearest = (1e-3 * relative).max(16.0 * f64::EPSILON);
-        let judge = Judge {
-            best: std::array::from_fn(|quantity| self.best[quantity].value),
-            relative,
-            nearest,
-            is_late: round >= SMOOTH_ROUNDS,
-            is_linear: drive.is_linear,
-            lines: self.lines,
-            is_sought: self.is_sought,
-        };
-        let mut most = 0.0_f64;
-        for seen in &mut self.seen {
-            if drive.has_gaps {
-                judge.close_in_on_changes(seen, round);
+impl Best {
+    /// Includes the moments of a piece from the one with this index on.
+    fn update(&mut self, seen: &Seen, piece: usize, first: usize, quantity: usize) {
+        for moment in first..seen.fractions.len() {
+            let values = &seen.values(moment)[seen.curves(quantity)];
+            let most = values.iter().fold(0.0_f64, |most, &value| most.max(value));
+            if most > self.value {
+                let tooth = values.iter().position(|&value| value >= most).unwrap_or(0);
+                *self = Self { value: most, piece, moment, tooth };
             }
-            most = most.max(judge.want(seen));
-            seen.wanted.sort_by(f64::total_cmp);
-            seen.wanted.dedup_by(|one, other| (*one - *other).abs() <= f64::EPSILON);
         }
-        most
+    }
+}
+
+impl SearchedDrive {
+    /// Returns the effect of rounding of closing angles on the loads, including a bend counted several times. The
+    /// amplification is `Δφ K/M`, with M the given or the allowed torque. If teeth press against corners, Δφ is at
+    /// least `distance_at_corner_rad`.
+    fn rounding(&self, best: &[Best; QUANTITIES]) -> f64 {
+        let [rotation_rad, stiffness_nmm_per_rad] = [LOADS, STIFFNESSES[0]].map(|quantity| best[quantity].value);
+        let per_torque = best[CAPACITY].value.max(1.0 / self.input_torque_nmm);
+        let rotation_rad = rotation_rad.max(self.distance_at_corner_rad);
+        ROUNDINGS * f64::EPSILON * (rotation_rad * stiffness_nmm_per_rad * per_torque)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::summit::{Bends, Nodes, Run};
+    use super::summit::{Nodes, Run, margins};
     use super::*;
 
     /// Returns a lap of sixteen intervals with one tooth, each moment filled in by the function.
@@ -305,7 +258,7 @@ mod tests {
                 above = above.max(bound - most);
             }
             let (mut bends, mut bounds) = ([0.0], [0.0]);
-            Bends::new(&run, stretch).margins(&[f64::INFINITY], &mut bends, &mut bounds);
+            margins(&run, stretch, &[f64::INFINITY], &mut bends, &mut bounds);
             let [margin] = bounds;
             assert!(margin >= most * (1.0 - 1e-14), "{margin} is below {most} on stretch {at}");
         }
@@ -370,7 +323,7 @@ mod tests {
     fn seen_of_a_tooth(pressed: impl Fn(f64) -> f64) -> Seen {
         seen_by(|seen, fraction| {
             seen.push(fraction)[LOADS] = 2.0;
-            seen.push_pressed(std::iter::once(pressed(fraction)));
+            seen.pressed.push(pressed(fraction));
         })
     }
 

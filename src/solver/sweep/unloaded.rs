@@ -80,9 +80,6 @@ fn by_input_angle(states: &States) -> impl Iterator<Item = Range<usize>> {
 
 /// Returns the pieces and fractions with the least and the largest wind-up without load. The ends of pieces are
 /// excluded, as they are evaluated anyway: a tooth on the lobe or in the valley closes no gap, but one next to it may.
-///
-/// # Errors
-/// As [`search()`].
 pub(crate) fn extremes(
     plain: &PlainLook<'_>,
     pieces: impl Iterator<Item = Piece>,
@@ -107,7 +104,7 @@ pub(crate) fn extremes(
             let closings_rad = closings_rad(plain, &piece, fraction)?;
             let first_rad = first_of(&closings_rad);
             if first_rad == f64::INFINITY {
-                return Err(plain.loaded().carries_nothing(&plain.teeth(&piece, fraction)?));
+                return Err(plain.loaded.carries_nothing(&plain.teeth(&piece, fraction)?));
             }
             let values = seen.push(fraction);
             for (tooth, closing_rad) in closings_rad.into_iter().enumerate() {
@@ -143,7 +140,7 @@ const FIRST: usize = LOADS + TOTALS - 1;
 
 /// Returns the closing angles of a piece, place by place.
 fn closings_rad(plain: &PlainLook<'_>, piece: &Piece, fraction: f64) -> Result<Vec<f64>, SolveError> {
-    let lost_motion_rad = plain.loaded().lost_motion_rad();
+    let lost_motion_rad = plain.loaded.lost_motion_rad();
     let teeth = plain.teeth(piece, fraction)?;
     // A gap that is taken up by lost motion may be closed up to rounding.
     Ok(teeth.iter().map(|tooth| (lost_motion_rad + tooth.spring.closing_rad).max(0.0)).collect())

@@ -5,21 +5,13 @@ use std::f64::consts::PI;
 /// Rectangle of contact of a flat.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlatContact {
-    length_mm: f64,
-    width_mm: f64,
+    /// Length along the slot, above 0.
+    pub length_mm: f64,
+    /// Width along the axis, above 0.
+    pub width_mm: f64,
 }
 
 impl FlatContact {
-    /// Builds the contact from a length along the slot and a width along the axis, both positive.
-    pub const fn new(length_mm: f64, width_mm: f64) -> Self {
-        Self { length_mm, width_mm }
-    }
-
-    /// Returns its length along the slot.
-    pub const fn length_mm(&self) -> f64 {
-        self.length_mm
-    }
-
     /// Returns the mean pressure under a force. The higher pressure at the edges is not modelled.
     pub fn stress_mpa(&self, force_n: f64) -> f64 {
         force_n / (self.length_mm * self.width_mm)

@@ -75,10 +75,9 @@ impl BallContact {
 /// Flat on the wall of its slot, at any place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Flat {
-    length_mm: f64,
-    width_mm: f64,
-    carrier_inner_radius_mm: f64,
-    carrier_outer_radius_mm: f64,
+    /// The contact over its whole length.
+    pub(crate) whole: FlatContact,
+    carrier_radii_mm: [f64; 2],
     modulus_mpa: f64,
     /// True if it has its own compliance law.
     pub(crate) has_own_law: bool,
@@ -88,19 +87,15 @@ impl Flat {
     /// Returns the supported length for a tooth centre at `center_radius_mm` from the axis. It is zero or negative if
     /// the flat has left the carrier.
     pub(crate) fn borne_mm(&self, center_radius_mm: f64) -> f64 {
-        let inner_mm = (center_radius_mm - 0.5 * self.length_mm).max(self.carrier_inner_radius_mm);
-        let outer_mm = (center_radius_mm + 0.5 * self.length_mm).min(self.carrier_outer_radius_mm);
+        let (half_mm, [carrier_inner_mm, carrier_outer_mm]) = (0.5 * self.whole.length_mm, self.carrier_radii_mm);
+        let inner_mm = (center_radius_mm - half_mm).max(carrier_inner_mm);
+        let outer_mm = (center_radius_mm + half_mm).min(carrier_outer_mm);
         outer_mm - inner_mm
     }
 
     /// Returns the contact over this length.
     pub(crate) const fn over(&self, borne_mm: f64) -> FlatContact {
-        FlatContact::new(borne_mm, self.width_mm)
-    }
-
-    /// Returns the contact over its whole length.
-    pub(crate) const fn whole(&self) -> FlatContact {
-        self.over(self.length_mm)
+        FlatContact { length_mm: borne_mm, ..self.whole }
     }
 
     /// Returns its approach under 1 N over this length.
@@ -138,17 +133,6 @@ pub(crate) fn plain_approach_mm(
     }
 }
 
-/// Contact of a tooth at a place.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Place {
-    /// Force over `F_H`.
-    pub(crate) force_ratio: f64,
-    /// Weight of its approach along `F_H`.
-    pub(crate) weight: f64,
-    /// Pressure model.
-    pub(crate) pressure: Pressure,
-}
-
 impl Contacts {
     /// Builds the contacts; none if the law does not apply to the shape.
     pub(crate) fn new(
@@ -165,12 +149,7 @@ impl Contacts {
             (ToothShape::FlatSided { .. }, Contact::Carrier) => Touch::Flat,
             (ToothShape::Cylinder { .. } | ToothShape::FlatSided { .. }, _) => Touch::Line,
         };
-        let law = |contact| law.term(touch(contact), contact, materials, size);
-        let laws = PerContact {
-            wave_generator: law(Contact::WaveGenerator)?,
-            ring: law(Contact::Ring)?,
-            carrier: law(Contact::Carrier)?,
-        };
+        let law = |contact| law.term(touch(contact), contact, materials, size).ok_or(());
         Some(Self {
             shape,
             tooth_radius_mm: size.radius_mm,
@@ -178,7 +157,7 @@ impl Contacts {
             carrier_radii_mm: carrier.of(drive),
             modulus_mpa: PerContact::of(|contact| materials.contact_modulus_mpa(contact)),
             hertz: PerContact::of(|contact| HertzLine::new(materials, contact, size.width_mm)),
-            law: laws,
+            law: PerContact::try_of(law).ok()?,
             series_compliance_mm_per_n: *series_compliance_mm_per_n,
         })
     }
@@ -200,12 +179,9 @@ impl Contacts {
     /// Returns the flat of flat-sided teeth.
     pub(crate) fn flat(&self) -> Option<Flat> {
         let ToothShape::FlatSided { flat_length_mm, .. } = self.shape else { return None };
-        let [carrier_inner_radius_mm, carrier_outer_radius_mm] = self.carrier_radii_mm;
         Some(Flat {
-            length_mm: flat_length_mm,
-            width_mm: self.tooth_width_mm,
-            carrier_inner_radius_mm,
-            carrier_outer_radius_mm,
+            whole: FlatContact { length_mm: flat_length_mm, width_mm: self.tooth_width_mm },
+            carrier_radii_mm: self.carrier_radii_mm,
             modulus_mpa: self.modulus_mpa.carrier,
             has_own_law: self.law.carrier == Term::Flat,
         })
@@ -229,32 +205,39 @@ impl Contacts {
         Ok(Some(Pressure::Line { hertz: *self.hertz.get(contact), curvature_per_mm }))
     }
 
-    /// Returns `ξ = Σ w δ` of a tooth over `F_H`, including this compliance of the ring in excess of that at its root.
-    pub(crate) fn approach(&self, places: &PerContact<Place>, ring_bending_mm_per_n: f64) -> Approach {
-        let mut linear_mm_per_n = places.ring.weight * (ring_bending_mm_per_n * places.ring.force_ratio);
+    /// Returns `ξ = Σ w δ` of a tooth over `F_H`, for the forces over `F_H` and the weights of the approaches, including
+    /// this compliance of the ring in excess of that at its root.
+    pub(crate) fn approach(
+        &self,
+        force_ratio: &PerContact<f64>,
+        weights: &PerContact<f64>,
+        pressure: &PerContact<Pressure>,
+        ring_bending_mm_per_n: f64,
+    ) -> Approach {
+        let mut linear_mm_per_n = weights.ring * (ring_bending_mm_per_n * force_ratio.ring);
         let mut power: Option<(f64, f64)> = None;
         let mut growth_mm_per_n = 0.0;
         // The contact that first reaches the end of Johnson's law sets the reference force of the logarithms, so all
         // are positive.
-        let johnson = PerContact::of(|contact| match (self.law.get(contact), &places.get(contact).pressure) {
+        let johnson = PerContact::of(|contact| match (self.law.get(contact), pressure.get(contact)) {
             (
                 Term::Logarithmic(law),
                 Pressure::Line { curvature_per_mm, .. } | Pressure::Corner(CornerContact { curvature_per_mm, .. }),
             ) => Some(law.at(*curvature_per_mm)),
             _ => None,
         });
-        let reference_n = places
+        let reference_n = force_ratio
             .iter()
-            .filter(|(_, place)| place.force_ratio > 0.0)
-            .filter_map(|(contact, place)| johnson.get(contact).map(|law| law.reference_n / place.force_ratio));
+            .filter(|&(_, &ratio)| ratio > 0.0)
+            .filter_map(|(contact, ratio)| johnson.get(contact).map(|law| law.reference_n / ratio));
         let reference_n = reference_n.fold(f64::INFINITY, f64::min);
-        for (contact, place) in places.iter() {
-            let (weight, ratio) = (place.weight, place.force_ratio);
+        for (contact, &ratio) in force_ratio.iter() {
+            let weight = *weights.get(contact);
             let mut add_power = |exponent: f64, coefficient: f64| {
                 let sum = power.map_or(0.0, |(_, sum)| sum);
                 power = Some((exponent, sum + weight * (coefficient * ratio.powf(exponent))));
             };
-            match (self.law.get(contact), &place.pressure) {
+            match (self.law.get(contact), pressure.get(contact)) {
                 (Term::Linear { compliance_mm_per_n }, _) => linear_mm_per_n += weight * (compliance_mm_per_n * ratio),
                 (Term::Power { exponent, coefficient }, _) => add_power(*exponent, *coefficient),
                 (Term::Ellipse, Pressure::Ellipse(ellipse)) => {
@@ -277,13 +260,13 @@ impl Contacts {
         }
         if growth_mm_per_n > 0.0 {
             let smooth = Logarithmic::new(linear_mm_per_n, growth_mm_per_n, reference_n);
-            match (johnson.ring, &places.ring.pressure) {
+            match (johnson.ring, &pressure.ring) {
                 (Some(law), Pressure::Corner(corner)) => {
-                    let Place { weight, force_ratio, .. } = places.ring;
                     let growth_mm_per_n = 2.0 * law.growth_mm_per_n + corner.bending_growth_mm_per_n;
                     let narrowing_n = corner.angle_rad * corner.angle_rad
-                        / (PI * PI * corner.curvature_per_mm * law.growth_mm_per_n * force_ratio);
-                    Approach::Corner(Corner::new(smooth, weight * force_ratio * growth_mm_per_n, narrowing_n))
+                        / (PI * PI * corner.curvature_per_mm * law.growth_mm_per_n * force_ratio.ring);
+                    let growth_mm_per_n = weights.ring * force_ratio.ring * growth_mm_per_n;
+                    Approach::Corner(Corner { smooth, growth_mm_per_n, narrowing_n })
                 }
                 _ => Approach::Logarithmic(smooth),
             }

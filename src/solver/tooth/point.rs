@@ -1,8 +1,9 @@
 //! Point contact: Hertz's ellipse (docs/explanation/theory.md sections 4.3 and 5).
 
+use std::convert::Infallible;
 use std::f64::consts::{FRAC_2_PI, PI};
 
-use crate::root::NotConverged;
+use crate::root::{NotConverged, golden_section};
 
 /// Returns Carlson's symmetric integral of the second kind `R_D(x, y, z) = (3/2) ∫ dt/(√(t+x) √(t+y) (t+z)^(3/2))` from
 /// t = 0. Needs `x, y ≥ 0`, not both zero, and `z > 0`. Method: duplication (B. C. Carlson, *Numerical computation of
@@ -36,28 +37,11 @@ fn carlson_rd(x: f64, y: f64, z: f64) -> f64 {
     }
 }
 
-/// Complete elliptic integrals of a contact ellipse for the parameter `m = 1 - k1²`, as sums of positive terms:
-/// `B = (E - k1² K)/m` and `D = (K - E)/m`, both π/4 for a circle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Integrals {
-    b: f64,
-    d: f64,
-}
-
-impl Integrals {
-    /// Returns the integrals for the ratio `k1` of the half-axes, short to long.
-    fn new(ratio: f64) -> Self {
-        let squared = ratio * ratio;
-        Self { b: squared * carlson_rd(0.0, 1.0, squared) / 3.0, d: carlson_rd(0.0, squared, 1.0) / 3.0 }
-    }
-
-    fn first_kind(&self) -> f64 {
-        self.b + self.d
-    }
-
-    fn second_kind(&self, ratio: f64) -> f64 {
-        self.b + ratio * ratio * self.d
-    }
+/// Returns complete elliptic integrals of a contact ellipse for the parameter `m = 1 - k1²`, as sums of positive terms:
+/// `B = (E - k1² K)/m` and `D = (K - E)/m`, both π/4 for a circle. The ratio `k1` of the half-axes is short to long.
+fn integrals(ratio: f64) -> (f64, f64) {
+    let squared = ratio * ratio;
+    (squared * carlson_rd(0.0, 1.0, squared) / 3.0, carlson_rd(0.0, squared, 1.0) / 3.0)
 }
 
 /// Contact of two bodies whose curvatures, convex positive, sum to `Σ` in either of two perpendicular planes.
@@ -99,8 +83,9 @@ impl EllipticContact {
         let (large, small) =
             if is_short_in_plane { (in_plane_per_mm, axial_per_mm) } else { (axial_per_mm, in_plane_per_mm) };
         let ratio = ratio_of_half_axes(large / small)?;
-        let integrals = Integrals::new(ratio);
-        let (first, second) = (integrals.first_kind(), integrals.second_kind(ratio));
+        let (b, d) = integrals(ratio);
+        // K and E.
+        let (first, second) = (b + d, b + ratio * ratio * d);
         let sum = large + small;
         let long_mm = (3.0 * second / (PI * modulus_mpa * sum * ratio * ratio)).cbrt();
         let stress_mpa =
@@ -144,14 +129,8 @@ impl EllipticContact {
     pub fn shear_below(&self, poissons_ratio: f64) -> ShearBelow {
         let shear = |depth: f64| shear_at(self.ratio, poissons_ratio, depth);
         // The only maximum is between these depths, from a circle (0.38 to 0.57 for ν up to 0.5) to a line (0.786).
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let (mut low, mut high) = (0.05, 1.2);
         // Sixty steps leave 1e-13 of the bracket, finer than a maximum can be located.
-        for _ in 0..60 {
-            let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-            if shear(left) > shear(right) { high = right } else { low = left }
-        }
-        let depth = 0.5 * (low + high);
+        let Ok((_, depth)) = golden_section(0.05, 1.2, 60, |depth| Ok::<_, Infallible>(-shear(depth)));
         ShearBelow { share: shear(depth), depth }
     }
 }
@@ -165,7 +144,7 @@ fn ratio_of_half_axes(curvature_ratio: f64) -> Result<f64, NotConverged> {
     let mut ln_ratio = -FRAC_2_PI * wanted;
     for _ in 0..CAP {
         let ratio = ln_ratio.exp();
-        let Integrals { b, d } = Integrals::new(ratio);
+        let (b, d) = integrals(ratio);
         let squared = ratio * ratio;
         let m = (1.0 - ratio) * (1.0 + ratio);
         // d ln(B/D)/dm = (D - B)/(2mB) - (B/k1² - D)/(2mD), at a circle -1/4. The slope affects only the speed.

@@ -118,7 +118,7 @@ pub static QUANTITIES: [Quantity; 61] = [
         "Largest pressure angle of the ring on the engaged flank.",
         geometry("/ring/pressure_angle_max_deg"),
         |variant| {
-            let steepest = variant.drive.steepest_engaged()?;
+            let steepest = variant.drive.ring_tooth().steepest_engaged()?;
             Ok(variant.drive.flank().at(&steepest).tan_pressure_angle.atan().to_degrees())
         },
     ),
@@ -127,7 +127,7 @@ pub static QUANTITIES: [Quantity; 61] = [
         "deg",
         "Largest pressure angle of the wave generator at an engaged tooth.",
         geometry("/wave_generator/pressure_angle_max_deg"),
-        |variant| Ok(variant.drive.steepest_engaged()?.tan_pressure_angle.atan().to_degrees()),
+        |variant| Ok(variant.drive.ring_tooth().steepest_engaged()?.tan_pressure_angle.atan().to_degrees()),
     ),
     of_drive(
         "slot_wall_mm",

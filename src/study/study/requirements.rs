@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use toothwave_calculation::coincidence_degree::CoincidenceDegree;
 use toothwave_calculation::design::Design;
 use toothwave_calculation::field::{FieldCode, FieldError};
-use toothwave_calculation::json::{Fault, Tree, path};
+use toothwave_calculation::json::{Tree, path};
 use toothwave_calculation::no_answer::{NoAnswer, NoAnswerCode};
 use toothwave_calculation::question::{self, Question as _};
 use toothwave_calculation::sweep::Sweep;
@@ -16,14 +16,14 @@ use crate::variant::{Domain, Template, Variable};
 
 /// Checks that no object has a field twice. Otherwise one of two ranges or limits with the same name would be dropped
 /// silently.
-pub(super) fn require_each_field_once(tree: &Tree) -> Result<(), Fault> {
+pub(super) fn require_each_field_once(tree: &Tree) -> Result<(), FieldError> {
     match tree {
         Tree::Object(fields) => {
             let mut names = HashSet::new();
             for (name, value) in fields {
                 if !names.insert(name) {
                     let detail = format!("the field `{name}` is given twice. Remove one");
-                    return Err(Fault::of_field(FieldCode::DuplicateField, name, detail));
+                    return Err(FieldError::at("", FieldCode::DuplicateField, detail).within(name));
                 }
                 require_each_field_once(value).map_err(|found| found.within(name))?;
             }

@@ -86,7 +86,7 @@ impl Question for WholeDesign {
         "design".into()
     }
 
-    fn reads<'a>(&self, design: &'a Design) -> impl Serialize + 'a {
+    fn reads(&self, design: &Design) -> impl Serialize {
         let Limits { max_states, max_profile_points, max_searched_states } = self.0;
         let limits = (max_states, max_profile_points, max_searched_states);
         (Geometry.reads(design), CoincidenceDegree.reads(design), Sweep.reads(design), limits)

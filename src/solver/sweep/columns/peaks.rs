@@ -43,19 +43,6 @@ pub struct ContactPeaks {
 }
 
 impl ContactPeaks {
-    /// Returns the peaks of a line contact with force `force_n` at its stress peak.
-    pub(crate) fn of_line(force_peak_n: Peak, stress_peak_mpa: Peak, force_n: f64, tooth_width_mm: f64) -> Self {
-        let half_width_mm = half_width_mm(force_n, stress_peak_mpa.value, tooth_width_mm);
-        Self {
-            force_n: force_peak_n,
-            stress_mpa: stress_peak_mpa,
-            half_width_mm,
-            half_length_mm: None,
-            shear_stress_mpa: Some(SHEAR_SHARE * stress_peak_mpa.value),
-            shear_depth_mm: Some(SHEAR_DEPTH * half_width_mm),
-        }
-    }
-
     /// Returns these peaks with the data of a contact of this pressure model and force `force_n` at its stress peak.
     pub(crate) fn of_pressure(
         self,
@@ -67,7 +54,7 @@ impl ContactPeaks {
         match pressure {
             Pressure::Line { .. } | Pressure::Corner(_) => self,
             Pressure::Flat(flat) => {
-                let half_width_mm = 0.5 * flat.length_mm();
+                let half_width_mm = 0.5 * flat.length_mm;
                 Self { half_width_mm, shear_stress_mpa: None, shear_depth_mm: None, ..self }
             }
             Pressure::Ellipse(ellipse) => {
@@ -112,7 +99,16 @@ impl PeaksSoFar {
 
     /// Returns the peaks of a line contact.
     pub(crate) fn of_line(&self, tooth_width_mm: f64) -> ContactPeaks {
-        ContactPeaks::of_line(self.force_n, self.stress_mpa, self.force_at_stress_n, tooth_width_mm)
+        let Self { force_n, stress_mpa, force_at_stress_n } = *self;
+        let half_width_mm = half_width_mm(force_at_stress_n, stress_mpa.value, tooth_width_mm);
+        ContactPeaks {
+            force_n,
+            stress_mpa,
+            half_width_mm,
+            half_length_mm: None,
+            shear_stress_mpa: Some(SHEAR_SHARE * stress_mpa.value),
+            shear_depth_mm: Some(SHEAR_DEPTH * half_width_mm),
+        }
     }
 }
 
@@ -138,6 +134,13 @@ pub struct TorqueCapacity {
 }
 
 impl TorqueCapacity {
+    /// Returns the capacity of a drive, limited by a contact, without a limit by the teeth.
+    pub(crate) fn new(drive: &Drive, input_torque_nm: f64, contact: Contact, input_angle_deg: f64) -> Self {
+        let output_torque_nm = input_torque_nm * drive.teeth_per_wave();
+        let limited_by = contact.into();
+        Self { input_torque_nm, output_torque_nm, limited_by, turns_past_teeth: false, input_angle_deg }
+    }
+
     /// Returns the capacity if all loads are proportional: for line contacts `M0 min (σ_a/σ)²`.
     pub(crate) fn in_proportion(
         drive: &Drive,
@@ -155,11 +158,7 @@ impl TorqueCapacity {
             .fold((Contact::WaveGenerator, share_of(Contact::WaveGenerator)), |least, other| {
                 if other.1 < least.1 { other } else { least }
             });
-        let peak = peaks.get(contact).stress_mpa;
-        let input_torque_nm = input_torque_nm * share;
-        let output_torque_nm = input_torque_nm * drive.teeth_per_wave();
-        let input_angle_deg = peak.input_angle_deg;
-        Self { input_torque_nm, output_torque_nm, limited_by: contact.into(), turns_past_teeth: false, input_angle_deg }
+        Self::new(drive, input_torque_nm * share, contact, peaks.get(contact).stress_mpa.input_angle_deg)
     }
 }
 
@@ -210,21 +209,23 @@ impl Extremes {
 pub(crate) struct AngleExtremes {
     wind_up_deg: Extremes,
     torsional_stiffness_nm_per_rad: Extremes,
-    loaded_teeth: Option<TeethInMesh>,
+    loaded_teeth: TeethInMesh,
 }
 
 impl AngleExtremes {
-    pub(crate) const NONE: Self =
-        Self { wind_up_deg: Extremes::NONE, torsional_stiffness_nm_per_rad: Extremes::NONE, loaded_teeth: None };
+    pub(crate) const NONE: Self = Self {
+        wind_up_deg: Extremes::NONE,
+        torsional_stiffness_nm_per_rad: Extremes::NONE,
+        loaded_teeth: TeethInMesh { min: u64::MAX, max: 0 },
+    };
 
     /// Adds an input angle.
     #[inline(always)]
     pub(crate) fn see(&mut self, wind_up_deg: f64, torsional_stiffness_nm_per_rad: f64, loaded_teeth: u64) {
         self.wind_up_deg = self.wind_up_deg.with(wind_up_deg);
         self.torsional_stiffness_nm_per_rad = self.torsional_stiffness_nm_per_rad.with(torsional_stiffness_nm_per_rad);
-        let TeethInMesh { min, max } =
-            self.loaded_teeth.unwrap_or(TeethInMesh { min: loaded_teeth, max: loaded_teeth });
-        self.loaded_teeth = Some(TeethInMesh { min: min.min(loaded_teeth), max: max.max(loaded_teeth) });
+        let TeethInMesh { min, max } = self.loaded_teeth;
+        self.loaded_teeth = TeethInMesh { min: min.min(loaded_teeth), max: max.max(loaded_teeth) };
     }
 
     /// Returns the summary, given the peaks of each contact.
@@ -238,7 +239,7 @@ impl AngleExtremes {
             contacts,
             wind_up_deg: self.wind_up_deg,
             torsional_stiffness_nm_per_rad: self.torsional_stiffness_nm_per_rad,
-            loaded_teeth: self.loaded_teeth.unwrap_or(TeethInMesh { min: 0, max: 0 }),
+            loaded_teeth: self.loaded_teeth,
             torque_capacity,
             torque_balance_residual,
         }

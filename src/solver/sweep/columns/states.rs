@@ -95,27 +95,19 @@ impl From<&Sweep> for SweepPeaks {
 
 impl States {
     pub(crate) fn with_capacity(count: usize, lists_lobes: bool) -> Self {
-        let column = || Vec::with_capacity(count);
-        Self {
-            input_angle_deg: column(),
-            tooth: Vec::with_capacity(count),
-            lobe: Vec::with_capacity(if lists_lobes { count } else { 0 }),
-            position_deg: column(),
-            center_radius_mm: column(),
-            wave_generator_angle_deg: column(),
-            ring_angle_deg: column(),
-            force_n: PerContact::of(|_| column()),
-            stress_mpa: PerContact::of(|_| column()),
-        }
+        Self::of_columns(|| Vec::with_capacity(count), || Vec::with_capacity(count), lists_lobes)
     }
 
     /// Returns columns of zeros with the teeth of all zones, to be filled in.
     pub(crate) fn of_zeros(count: usize) -> Self {
-        let column = || vec![0.0; count];
+        Self::of_columns(|| vec![0.0; count], || vec![0; count], true)
+    }
+
+    fn of_columns(column: impl Fn() -> Vec<f64>, numbers: impl Fn() -> Vec<u32>, lists_lobes: bool) -> Self {
         Self {
             input_angle_deg: column(),
-            tooth: vec![0; count],
-            lobe: vec![0; count],
+            tooth: numbers(),
+            lobe: if lists_lobes { numbers() } else { Vec::new() },
             position_deg: column(),
             center_radius_mm: column(),
             wave_generator_angle_deg: column(),
@@ -181,23 +173,6 @@ impl InputAngles {
         self.wind_up_deg.push(wind_up_deg);
         self.torsional_stiffness_nm_per_rad.push(torsional_stiffness_nm_per_rad);
         self.loaded_teeth.push(loaded_teeth);
-    }
-
-    /// Appends several input angles.
-    #[inline(always)]
-    pub(crate) fn extend(
-        &mut self,
-        drive: &Drive,
-        input_angle_deg: &[f64],
-        rotation_rad: &[f64],
-        stiffness_nmm_per_rad: impl Iterator<Item = f64>,
-        loaded_teeth: impl Iterator<Item = usize>,
-    ) {
-        self.input_angle_deg.extend_from_slice(input_angle_deg);
-        self.wind_up_deg.extend(rotation_rad.iter().map(|rotation_rad| rotation_rad.to_degrees()));
-        let of_output = |stiffness| Self::of_output(drive, stiffness);
-        self.torsional_stiffness_nm_per_rad.extend(stiffness_nmm_per_rad.map(of_output));
-        self.loaded_teeth.extend(loaded_teeth.map(|teeth| u32::try_from(teeth).unwrap_or(u32::MAX)));
     }
 
     /// Appends the first input angle again, one period later.

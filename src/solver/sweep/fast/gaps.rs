@@ -5,9 +5,10 @@
 use std::f64::consts::PI;
 
 use super::laps::{LapTeeth, whole};
-use super::sharing::{Teeth, Weights};
+use super::sharing::Weights;
+use super::tile::Tile;
 use crate::contact::PerContact;
-use crate::gaps::{Deviations, Gaps, MM_PER_UM, Modification, RAD_PER_ARCSEC, TipRelief, of};
+use crate::gaps::{Deviations, MM_PER_UM, RAD_PER_ARCSEC, TipRelief, of};
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::{Mesh, Place};
 
@@ -15,11 +16,11 @@ use crate::mesh::{Mesh, Place};
 const EDGE: f64 = 1e-12;
 
 /// Gaps of teeth.
-pub(super) enum GapColumns {
+pub(super) enum GapColumns<'a> {
     /// The same at all teeth.
     Uniform { gap_mm: PerContact<f64>, weights: Weights },
     /// Varying with the position, and with the items that deviate; by virtual work.
-    Unlike(Box<UnlikeGaps>),
+    Unlike(UnlikeGaps<'a>),
 }
 
 /// Columns to compute gaps in; empty if gaps are the same at all teeth.
@@ -65,26 +66,11 @@ impl<'a> GapWork<'a> {
 }
 
 /// Gaps that are not the same at all teeth.
-pub(super) struct UnlikeGaps {
-    clearance_mm: PerContact<f64>,
-    modification: Modification,
-    relief: Option<Relief>,
+pub(super) struct UnlikeGaps<'a> {
+    loaded: &'a LoadedDrive<'a>,
     deviating: Option<Deviating>,
-    /// Lost motion common to all teeth, which closing angles exclude.
-    lost_motion_rad: f64,
-    tooth_radius_mm: f64,
-    ring_teeth_per_wave: f64,
-    teeth_per_wave: f64,
     /// Total gaps between zero and this value are left to the plain path.
     edge_mm: f64,
-}
-
-/// Tip relief.
-struct Relief {
-    amount_mm: f64,
-    start_rad: f64,
-    end_rad: f64,
-    power: f64,
 }
 
 /// Deviations of individual items.
@@ -147,80 +133,60 @@ impl Deviating {
     }
 }
 
-impl GapColumns {
+impl<'a> GapColumns<'a> {
     /// Returns the gaps of a drive under a load; none if there are no gaps.
-    pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
+    pub(super) fn new(loaded: &'a LoadedDrive<'a>) -> Option<Self> {
         let gaps = &loaded.gaps;
         if gaps.is_nil() {
             None
         } else if gaps.are_uniform() {
             Some(Self::Uniform { gap_mm: gaps.clearance_mm, weights: Weights::new(loaded) })
         } else {
-            Some(Self::Unlike(Box::new(UnlikeGaps::new(loaded, gaps))))
+            Some(Self::Unlike(UnlikeGaps::new(loaded)))
         }
     }
 
     /// Returns true if gaps belong to individual items.
-    pub(super) fn are_of_items(&self) -> bool {
-        matches!(self, Self::Unlike(unlike) if unlike.deviating.is_some())
-    }
-
-    /// Returns true if they are not the same at all teeth.
-    pub(super) const fn are_unlike(&self) -> bool {
-        matches!(self, Self::Unlike(_))
-    }
-
-    /// Returns the lost motion common to all teeth, which closing angles exclude.
-    pub(super) const fn lost_motion_rad(&self) -> f64 {
-        match self {
-            Self::Uniform { .. } => 0.0,
-            Self::Unlike(unlike) => unlike.lost_motion_rad,
-        }
+    pub(super) const fn are_of_items(&self) -> bool {
+        matches!(self, Self::Unlike(UnlikeGaps { deviating: Some(_), .. }))
     }
 
     /// Computes what depends on the places of a tile. Returns false if it needs the plain path.
     #[inline(always)]
-    pub(super) fn prepare(&self, teeth: &Teeth<'_>, gaps: &mut GapWork<'_>, closing: &mut [f64]) -> bool {
+    pub(super) fn prepare(&self, tile: &mut Tile<'_>) -> bool {
         match self {
             Self::Uniform { gap_mm, weights } => {
-                close_alike(gap_mm, weights, teeth, closing);
+                close_alike(gap_mm, weights, tile);
                 true
             }
             Self::Unlike(unlike) => {
-                unlike.prepare(teeth, gaps);
-                unlike.deviating.is_some() || unlike.close(teeth, gaps, closing)
+                unlike.prepare(tile);
+                unlike.deviating.is_some() || unlike.close(tile)
             }
         }
     }
 
-    /// Records the teeth in a tile.
-    pub(super) fn set_teeth(&self, mesh: &Mesh, teeth: &LapTeeth, gaps: &mut GapWork<'_>) {
-        let Self::Unlike(unlike) = self else { return };
-        let Some(deviating) = &unlike.deviating else { return };
-        for listed in &teeth.listed {
-            for tooth in 0..listed.count() {
-                let item = deviating.item(&listed.place(mesh, tooth));
-                gaps.items.iter_mut().zip(item).for_each(|(column, value)| column[listed.at + tooth] = value);
-            }
-        }
-    }
-
-    /// Computes the closing angles of these teeth. Returns false if the tile needs the plain path.
+    /// Closes the gaps of the teeth of a lap if items are distinguished. Returns false if the tile needs the plain path.
     #[inline(always)]
-    pub(super) fn close_at_items(&self, teeth: &Teeth<'_>, gaps: &mut GapWork<'_>, closing: &mut [f64]) -> bool {
-        match self {
-            Self::Uniform { .. } => true,
-            Self::Unlike(unlike) => unlike.close_at_items(teeth, gaps, closing),
+    pub(super) fn close_at_items(&self, mesh: &Mesh, teeth: &LapTeeth, tile: &mut Tile<'_>) -> bool {
+        let Self::Unlike(unlike) = self else { return true };
+        let Some(deviating) = &unlike.deviating else { return true };
+        for run in &teeth.listed {
+            for (at, tooth) in run.at.clone().zip(0..) {
+                let item = deviating.item(&mesh.place_of(&run.teeth, tooth));
+                tile.gaps.items.iter_mut().zip(item).for_each(|(column, value)| column[at] = value);
+            }
         }
+        unlike.close_at_items(tile)
     }
 }
 
 /// `g/|h'|`, infinite if there is no arm.
 #[inline(always)]
-fn close_alike(gap_mm: &PerContact<f64>, weights: &Weights, teeth: &Teeth<'_>, closing: &mut [f64]) {
-    let len = teeth.len;
-    let closing = &mut closing[..len];
-    let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+fn close_alike(gap_mm: &PerContact<f64>, weights: &Weights, tile: &mut Tile<'_>) {
+    let len = tile.len();
+    let (arm, closing) = (&tile.torque.wave_generator[..len], &mut tile.work.closing[..len]);
+    let (ring, carrier) = (&tile.force.ring[..len], &tile.force.carrier[..len]);
     for i in 0..len {
         let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
         let ring = if weights.ring_exponent > 0.0 { ring[i] } else { 1.0 / ring[i] };
@@ -231,21 +197,12 @@ fn close_alike(gap_mm: &PerContact<f64>, weights: &Weights, teeth: &Teeth<'_>, c
     }
 }
 
-impl UnlikeGaps {
-    fn new(loaded: &LoadedDrive<'_>, gaps: &Gaps<'_>) -> Self {
-        let drive = loaded.drive();
-        let (modification, clearance_mm) = (gaps.modification, gaps.clearance_mm);
+impl<'a> UnlikeGaps<'a> {
+    fn new(loaded: &'a LoadedDrive<'a>) -> Self {
+        let (drive, gaps, m) = (loaded.drive(), &loaded.gaps, &loaded.gaps.modification);
         let deviating = gaps.deviations.map(|deviations| Deviating::new(loaded, deviations));
-        let relief = modification.ring_tip_relief.map(|TipRelief { amount_um, start_deg, power }| Relief {
-            amount_mm: MM_PER_UM * amount_um,
-            start_rad: start_deg.to_radians(),
-            end_rad: drive.flank_limit().position.from_lobe_rad,
-            power,
-        });
-        let lost_motion_rad = gaps.lost_motion_rad();
         // No arm is longer than a centre's distance.
         let arm_mm = drive.flank().locus().cam_outer_radius_mm() + drive.parameters().tooth_radius_mm;
-        let m = &modification;
         let of_modification = [
             m.ring_equidistant_um,
             m.ring_path_shift_um,
@@ -253,39 +210,31 @@ impl UnlikeGaps {
             m.wave_generator_equidistant_um,
             m.slot_wall_um,
             m.tooth_radius_um,
-            relief.as_ref().map_or(0.0, |relief| relief.amount_mm / MM_PER_UM),
+            m.ring_tip_relief.map_or(0.0, |relief| relief.amount_um),
         ];
-        let most_mm = clearance_mm.iter().map(|(_, gap_mm)| gap_mm).sum::<f64>()
+        let most_mm = gaps.clearance_mm.iter().map(|(_, gap_mm)| gap_mm).sum::<f64>()
             + MM_PER_UM * of_modification.iter().map(|gap_um| gap_um.abs()).sum::<f64>()
-            + lost_motion_rad.abs() * arm_mm
+            + loaded.lost_motion_rad().abs() * arm_mm
             + deviating.as_ref().map_or(0.0, |deviating| deviating.most_mm(arm_mm));
-        Self {
-            clearance_mm,
-            modification,
-            relief,
-            deviating,
-            lost_motion_rad,
-            tooth_radius_mm: drive.parameters().tooth_radius_mm,
-            ring_teeth_per_wave: drive.flank().teeth_per_wave(),
-            teeth_per_wave: drive.teeth_per_wave(),
-            edge_mm: EDGE * most_mm,
-        }
+        Self { loaded, deviating, edge_mm: EDGE * most_mm }
     }
 
     /// Computes the gaps and directions that depend on the position. `sin γ` follows from `F_S/F_H`, `cos β` from
     /// `F_K/F_H`, and `cos(β - δ)` of section 4.8 is `(d cos β + r)/√(d² + 2dr cos β + r²)`.
     #[inline(always)]
-    fn prepare(&self, teeth: &Teeth<'_>, gaps: &mut GapWork<'_>) {
-        let len = teeth.len;
-        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
-        let (d, r, m) = (&teeth.center_radius_mm[..len], self.tooth_radius_mm, &self.modification);
+    fn prepare(&self, tile: &mut Tile<'_>) {
+        let (len, gaps, drive) = (tile.len(), &mut tile.gaps, self.loaded.drive());
+        let (m, clearance_mm) = (&self.loaded.gaps.modification, &self.loaded.gaps.clearance_mm);
+        let (arm, d) = (&tile.torque.wave_generator[..len], &tile.center_radius_mm[..len]);
+        let (ring, carrier) = (&tile.force.ring[..len], &tile.force.carrier[..len]);
         let (along, per_arm) = (&mut gaps.along[..len], &mut gaps.per_arm[..len]);
         let thinner_mm = MM_PER_UM * m.tooth_radius_um;
-        let of_cam = self.clearance_mm.wave_generator + MM_PER_UM * m.wave_generator_equidistant_um + thinner_mm;
-        let of_ring = self.clearance_mm.ring + MM_PER_UM * m.ring_equidistant_um + thinner_mm;
-        let of_carrier = self.clearance_mm.carrier + MM_PER_UM * m.slot_wall_um + thinner_mm;
+        let of_cam = clearance_mm.wave_generator + MM_PER_UM * m.wave_generator_equidistant_um + thinner_mm;
+        let of_ring = clearance_mm.ring + MM_PER_UM * m.ring_equidistant_um + thinner_mm;
+        let of_carrier = clearance_mm.carrier + MM_PER_UM * m.slot_wall_um + thinner_mm;
         let (path_shift, profile_shift) = (MM_PER_UM * m.ring_path_shift_um, MM_PER_UM * m.ring_profile_shift_um);
-        let (per_ratio, k) = (1.0 / self.teeth_per_wave, self.ring_teeth_per_wave);
+        let (per_ratio, k) = (1.0 / drive.teeth_per_wave(), drive.flank().teeth_per_wave());
+        let r = drive.parameters().tooth_radius_mm;
         let (cam_cos, cam_sin) = (&mut gaps.cam_cos[..len], &mut gaps.cam_sin[..len]);
         let (ring_cos, ring_sin) = (&mut gaps.ring_cos[..len], &mut gaps.ring_sin[..len]);
         for i in 0..len {
@@ -301,7 +250,9 @@ impl UnlikeGaps {
             (ring_cos[i], ring_sin[i]) = (cos_beta, k * sin_gamma * per_ring);
         }
         let from_lobe_rad = &gaps.from_lobe_rad[..len];
-        if let Some(Relief { amount_mm, start_rad, end_rad, power }) = self.relief {
+        if let Some(TipRelief { amount_um, start_deg, power }) = m.ring_tip_relief {
+            let (amount_mm, start_rad) = (MM_PER_UM * amount_um, start_deg.to_radians());
+            let end_rad = drive.flank_limit().position.from_lobe_rad;
             for i in 0..len {
                 let beyond_rad = from_lobe_rad[i] - start_rad;
                 if beyond_rad > 0.0 {
@@ -324,13 +275,14 @@ impl UnlikeGaps {
 
     /// `g/|h'|`, infinite if there is no arm. Returns false if interference is possible.
     #[inline(always)]
-    fn close(&self, teeth: &Teeth<'_>, gaps: &GapWork<'_>, closing: &mut [f64]) -> bool {
-        let count = teeth.rows * teeth.count;
-        let (along, per_arm, arm) = (&gaps.along[..count], &gaps.per_arm[..count], &teeth.arm[..count]);
-        let (closing, no_teeth) = closing[..teeth.len].split_at_mut(count);
+    fn close(&self, tile: &mut Tile<'_>) -> bool {
+        let (count, len, lost_motion_rad) = (tile.count, tile.len(), self.loaded.lost_motion_rad());
+        let (along, per_arm) = (&tile.gaps.along[..count], &tile.gaps.per_arm[..count]);
+        let arm = &tile.torque.wave_generator[..count];
+        let (closing, no_teeth) = tile.work.closing[..len].split_at_mut(count);
         let mut in_doubt = 0.0;
         for i in 0..count {
-            let total = along[i] + self.lost_motion_rad * arm[i];
+            let total = along[i] + lost_motion_rad * arm[i];
             in_doubt = if self.is_in_doubt(total) { 1.0 } else { in_doubt };
             closing[i] = if arm[i] > 0.0 { along[i] * per_arm[i] } else { f64::INFINITY };
         }
@@ -340,25 +292,26 @@ impl UnlikeGaps {
 
     /// The same with the deviations of the items.
     #[inline(always)]
-    fn close_at_items(&self, teeth: &Teeth<'_>, gaps: &GapWork<'_>, closing: &mut [f64]) -> bool {
-        let count = teeth.count;
+    fn close_at_items(&self, tile: &mut Tile<'_>) -> bool {
+        let (count, rows, len, gaps) = (tile.teeth, tile.rows(), tile.len(), &tile.gaps);
+        let lost_motion_of_all_rad = self.loaded.lost_motion_rad();
         let [cam, by_cam_cos, by_cam_sin, ring, by_ring_cos, by_ring_sin, carrier, lost_motion] =
             gaps.items.each_ref().map(|item| &item[..count]);
-        closing[teeth.rows * count..teeth.len].fill(f64::INFINITY);
+        tile.work.closing[tile.count..len].fill(f64::INFINITY);
         let mut in_doubt = 0.0;
-        for row in 0..teeth.rows {
-            let at = row * count..(row + 1) * count;
-            let (arm, ring_ratio) = (&teeth.arm[at.clone()], &teeth.ring_ratio[at.clone()]);
-            let carrier_ratio = &teeth.carrier_ratio[at.clone()];
+        for row in 0..rows {
+            let at = tile.of_row(row);
+            let (arm, ring_ratio) = (&tile.torque.wave_generator[at.clone()], &tile.force.ring[at.clone()]);
+            let carrier_ratio = &tile.force.carrier[at.clone()];
             let (along, per_arm) = (&gaps.along[at.clone()], &gaps.per_arm[at.clone()]);
             let (cam_cos, cam_sin) = (&gaps.cam_cos[at.clone()], &gaps.cam_sin[at.clone()]);
             let (ring_cos, ring_sin) = (&gaps.ring_cos[at.clone()], &gaps.ring_sin[at.clone()]);
-            let closing = &mut closing[at];
+            let closing = &mut tile.work.closing[at];
             for i in 0..count {
                 let at_cam = cam[i] + by_cam_cos[i] * cam_cos[i] + by_cam_sin[i] * cam_sin[i];
                 let at_ring = ring[i] + by_ring_cos[i] * ring_cos[i] + by_ring_sin[i] * ring_sin[i];
                 let gap = along[i] + at_cam + ring_ratio[i] * at_ring + carrier_ratio[i] * carrier[i];
-                let total = gap + (lost_motion[i] + self.lost_motion_rad) * arm[i];
+                let total = gap + (lost_motion[i] + lost_motion_of_all_rad) * arm[i];
                 in_doubt = if self.is_in_doubt(total) { 1.0 } else { in_doubt };
                 closing[i] = if arm[i] > 0.0 { gap * per_arm[i] + lost_motion[i] } else { f64::INFINITY };
             }

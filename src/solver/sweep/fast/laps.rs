@@ -1,7 +1,9 @@
 //! Assignment of a sweep's samples to laps of its mesh, and the teeth at each sample (docs/explanation/theory.md
 //! sections 3 and 9).
 
-use crate::mesh::{Mesh, Neighbours, Place, Samples};
+use std::ops::Range;
+
+use crate::mesh::{Mesh, Neighbours, Samples};
 
 /// Converts a count to an index. The caller has bounded the sweep to what fits in memory.
 pub(super) fn whole(count: u64) -> usize {
@@ -20,9 +22,6 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// One tooth at each place, place by place.
-    pub(super) const PLAIN: Self = Self { at_each_place: 1, apart: 1 };
-
     /// Returns the index of a place, counted from 1, among `places`, for the first of the distinguished teeth.
     pub(super) fn index(self, place: usize, places: usize) -> usize {
         let (before, residue) = ((place - 1) / self.apart, (place - 1) % self.apart);
@@ -32,22 +31,11 @@ impl Layout {
 }
 
 /// Teeth of a zone that are adjacent both in a tile and in the answer.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(super) struct Listed {
-    /// Index of the first of them in a row of the tile.
-    pub(super) at: usize,
+    /// Their indices in a row of the tile.
+    pub(super) at: Range<usize>,
     pub(super) teeth: Neighbours,
-}
-
-impl Listed {
-    pub(super) fn count(&self) -> usize {
-        whole(self.teeth.count)
-    }
-
-    /// Returns the place of one of them among the items.
-    pub(super) fn place(&self, mesh: &Mesh, tooth: usize) -> Place {
-        mesh.place_of(&self.teeth, tooth as u64)
-    }
 }
 
 #[derive(Debug, Default)]
@@ -55,15 +43,8 @@ pub(super) struct LapTeeth {
     runs: Vec<Neighbours>,
     /// Listed teeth in the order of the answer.
     pub(super) listed: Vec<Listed>,
-    /// The same teeth in chunks, independent of the lobe.
-    pub(super) stretches: Vec<Stretch>,
-}
-
-/// Teeth of a row that are adjacent both in the tile and in the answer.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Stretch {
-    pub(super) at: usize,
-    pub(super) count: usize,
+    /// Indices of the same teeth in chunks, independent of the lobe.
+    pub(super) stretches: Vec<Range<usize>>,
 }
 
 impl LapTeeth {
@@ -74,13 +55,14 @@ impl LapTeeth {
         self.listed.extend(self.runs.iter().map(|&teeth| {
             // Lobes that differ by a multiple of this number carry alike.
             let which = if layout.at_each_place > 1 { whole(teeth.lobe / apart) } else { 0 };
-            Listed { at: which * places + layout.index(whole(teeth.first_place), places), teeth }
+            let start = which * places + layout.index(whole(teeth.first_place), places);
+            Listed { at: start..start + whole(teeth.count), teeth }
         }));
         self.stretches.clear();
-        for listed in &self.listed {
+        for Listed { at, .. } in &self.listed {
             match self.stretches.last_mut() {
-                Some(last) if last.at + last.count == listed.at => last.count += listed.count(),
-                _ => self.stretches.push(Stretch { at: listed.at, count: listed.count() }),
+                Some(last) if last.end == at.start => last.end = at.end,
+                _ => self.stretches.push(at.clone()),
             }
         }
     }
@@ -89,13 +71,14 @@ impl LapTeeth {
 /// Laps of a sweep over equal intervals. For sample n of N in a load period of L laps, `n L = l N + f` with f below N.
 /// It is in lap l at f/N of the lap. With `G = gcd(N, L)`, `S = N/G` and `q = L/G` this is `n q = l S + f/G`.
 pub(super) struct Laps {
-    mesh: Mesh,
-    samples: Samples,
+    /// Mesh of the sweep.
+    pub(super) mesh: Mesh,
+    pub(super) samples: Samples,
     /// `S`.
     pub(super) of_lap: Samples,
     /// `q`: distance between successive samples of a lap, in S parts of it.
     pub(super) stride: u64,
-    count: u64,
+    pub(super) count: u64,
     /// Number of listed teeth before each of S successive samples, which cover all parts of a lap, and in total. Set if
     /// the teeth of all zones are listed.
     before: Option<Vec<usize>>,
@@ -122,11 +105,6 @@ impl Laps {
         Self { mesh: *mesh, samples, of_lap, stride, count: mesh.laps(), before }
     }
 
-    /// Returns the mesh of the sweep.
-    pub(super) const fn mesh(&self) -> &Mesh {
-        &self.mesh
-    }
-
     /// Returns true if the teeth of all zones are listed.
     pub(super) const fn are_listed(&self) -> bool {
         self.before.is_some()
@@ -140,11 +118,6 @@ impl Laps {
         let first = (0..stride).find(|lap| (lap * of_lap + fraction).is_multiple_of(stride)).unwrap_or(count);
         let end = (fraction == 0 && self.are_listed()).then_some(count);
         (first..count).step_by(whole(stride)).chain(end)
-    }
-
-    /// Returns true if a lap begins at the end of the sweep.
-    pub(super) const fn is_end(&self, lap: u64) -> bool {
-        lap == self.count
     }
 
     /// Returns the sample at a part of a lap.
@@ -161,15 +134,5 @@ impl Laps {
         let Some(before) = &self.before else { return 0 };
         let of_lap = self.of_lap.count();
         whole(sample / of_lap) * before[whole(of_lap)] + before[whole(sample % of_lap)]
-    }
-
-    /// Returns the number of samples of the sweep, including its end.
-    pub(super) fn sample_count(&self) -> usize {
-        whole(self.mesh.last_sample(self.samples) + 1)
-    }
-
-    /// Returns the number of states of the sweep, including those at its end.
-    pub(super) fn state_count(&self) -> usize {
-        whole(self.mesh.state_count(self.samples))
     }
 }

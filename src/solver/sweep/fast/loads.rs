@@ -2,78 +2,93 @@
 
 use pulp::Simd;
 
-use super::gaps::{GapColumns, GapWork};
-use super::lanes::{LANES, cube_root, repeat_each};
+use super::Kernel;
+use super::lanes::{cube_root, repeat_each};
 use super::laps::LapTeeth;
 use super::pressures::Pressures;
-use super::sharing::{Limit, Shared, Sharing, Teeth, Work};
+use super::sharing::Limit;
 use super::tile::Tile;
-use super::{Kernel, Law};
 use crate::contact::PerContact;
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::Mesh;
 use crate::sweep::columns::{TorqueBalance, TorqueCapacity, worse};
 
-impl Limit {
-    pub(super) fn capacity(&self, loaded: &LoadedDrive<'_>, input_angle_deg: f64) -> TorqueCapacity {
-        let input_torque_nm = 1e-3 * (loaded.zones * self.torque_nmm);
-        let output_torque_nm = input_torque_nm * loaded.drive().teeth_per_wave();
-        let limited_by = self.contact.into();
-        TorqueCapacity { input_torque_nm, output_torque_nm, limited_by, turns_past_teeth: false, input_angle_deg }
+/// Torque balance and capacity over all tiles.
+pub(super) struct Totals {
+    balance: TorqueBalance,
+    pub(super) torque_balance_residual: f64,
+    pub(super) torque_capacity: Option<TorqueCapacity>,
+}
+
+impl Totals {
+    pub(super) fn new(loaded: &LoadedDrive<'_>) -> Self {
+        let balance = TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm());
+        Self { balance, torque_balance_residual: 0.0, torque_capacity: None }
+    }
+
+    /// Includes a tile and its limit.
+    #[inline(always)]
+    pub(super) fn take(
+        &mut self,
+        loaded: &LoadedDrive<'_>,
+        tile: &mut Tile<'_>,
+        limit: Option<&Limit>,
+        input_angle_deg: impl Fn(usize) -> f64,
+    ) {
+        if let Some(limit) = limit {
+            let input_torque_nm = 1e-3 * (loaded.zones * limit.torque_nmm);
+            let capacity =
+                TorqueCapacity::new(loaded.drive(), input_torque_nm, limit.contact, input_angle_deg(limit.row));
+            // The first of equal ones counts, in any order of evaluation.
+            let is_first = |before: &TorqueCapacity| {
+                let order = before.input_torque_nm.total_cmp(&capacity.input_torque_nm);
+                order.then(before.input_angle_deg.total_cmp(&capacity.input_angle_deg)).is_le()
+            };
+            self.torque_capacity = Some(self.torque_capacity.filter(is_first).unwrap_or(capacity));
+        }
+        let rows = tile.rows();
+        for row in 0..rows {
+            let torque = PerContact::of(|contact| tile.row_torque.get(contact)[row]);
+            tile.row_residual[row] = self.balance.residual(&torque);
+        }
+        let residuals = tile.row_residual[..rows].iter();
+        self.torque_balance_residual =
+            residuals.fold(self.torque_balance_residual, |worst, &residual| worse(residual, worst));
     }
 }
 
-impl Kernel {
-    /// Computes what depends on the places of a tile: law and gaps. Returns false if it needs the plain path.
+impl Kernel<'_> {
+    /// Computes the loads of a tile from its unit loads; for the teeth of a lap if items are distinguished. Returns false
+    /// if the tile needs the plain path.
     #[inline(always)]
-    pub(super) fn prepare<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
-        let Law::Sharing(sharing) = &self.law else { return true };
-        let (teeth, work, gap_work, _) = self.teeth_of(count, tile);
-        sharing.prepare::<V>(loaded.input_torque_nmm() / loaded.zones, &teeth, work);
-        self.gaps.as_ref().is_none_or(|gaps| gaps.prepare(&teeth, gap_work, work.closing))
-    }
-
-    /// Closes the gaps of the teeth of a lap if items are distinguished. Returns false if the tile needs the plain
-    /// path.
-    #[inline(always)]
-    pub(super) fn close(&self, mesh: &Mesh, lap_teeth: &LapTeeth, count: usize, tile: &mut Tile<'_>) -> bool {
-        let Some(gaps) = self.gaps.as_ref().filter(|gaps| gaps.are_of_items()) else { return true };
-        gaps.set_teeth(mesh, lap_teeth, &mut tile.gaps);
-        let (teeth, work, gap_work, _) = self.teeth_of(count, tile);
-        gaps.close_at_items(&teeth, gap_work, work.closing)
-    }
-
-    /// Computes the loads of a tile from its unit loads, and their limits. Returns none if it needs the plain path. If
-    /// a limit is searched for, `shared` receives the result of load sharing first, because the limit overwrites it.
-    #[inline(always)]
-    pub(super) fn loads<V: Simd>(
-        &self,
-        loaded: &LoadedDrive<'_>,
-        teeth: usize,
-        tile: &mut Tile<'_>,
-        shared: impl FnOnce(&Sharing, &Work<'_>),
-    ) -> Option<Option<Limit>> {
-        let Law::Sharing(sharing) = &self.law else {
-            Self::scale(loaded, teeth, tile);
-            return Some(None);
+    pub(super) fn loads<V: Simd>(&self, mesh: &Mesh, lap_teeth: &LapTeeth, tile: &mut Tile<'_>) -> bool {
+        let Some(sharing) = &self.sharing else {
+            self.scale(tile);
+            return true;
         };
-        if !self.share::<V>(sharing, loaded, teeth, tile) {
-            return None;
+        if !self.gaps.as_ref().is_none_or(|gaps| gaps.close_at_items(mesh, lap_teeth, tile))
+            || !sharing.share::<V>(self.torque_of_zone_nmm(), self.gaps.is_some(), tile)
+        {
+            return false;
         }
-        shared(sharing, &tile.work);
-        let limit = match &self.allowable_mpa {
-            Some(allowable_mpa) => Some(self.limit::<V>(sharing, allowable_mpa, teeth, tile)?),
-            None => None,
-        };
-        self.scale_shared::<V>(loaded, teeth, tile);
-        Some(limit)
+        self.scale_shared::<V>(tile);
+        true
+    }
+
+    /// Returns the limit of a tile with loads, if one is searched for. Returns an outer none if the tile needs the plain
+    /// path. It overwrites rotations and pressed teeth of the load sharing, so what reads them comes first.
+    #[inline(always)]
+    pub(super) fn limit<V: Simd>(&self, tile: &mut Tile<'_>) -> Option<Option<Limit>> {
+        let (Some(sharing), Some(allowable_mpa)) = (&self.sharing, &self.allowable_mpa) else { return Some(None) };
+        let per_allowable = PerContact::of(|contact| 1.0 / allowable_mpa.get(contact));
+        sharing.limit::<V>(&per_allowable, tile).map(Some)
     }
 
     /// Rotates the wave generator at each input angle of a tile until the loads balance the torque.
     #[inline(always)]
-    fn scale(loaded: &LoadedDrive<'_>, teeth: usize, tile: &mut Tile<'_>) {
-        let rows = tile.sum_torques::<true>(teeth);
-        let (input_nmm, zones) = (loaded.input_torque_nmm(), loaded.zones);
+    fn scale(&self, tile: &mut Tile<'_>) {
+        let (rows, teeth) = (tile.sum_torques::<true>(), tile.teeth);
+        let (input_nmm, zones) = (self.loaded.input_torque_nmm(), self.loaded.zones);
         let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
         let (cam, ring, carrier) = (&mut cam[..rows], &mut ring[..rows], &mut carrier[..rows]);
         let (rotation_rad, rotation_root) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_rotation_root[..rows]);
@@ -96,66 +111,20 @@ impl Kernel {
         repeat_each(rotation_root, teeth, tile.scale_root);
     }
 
-    /// Returns the teeth of a tile under 1 N, and the inputs and outputs of load sharing.
-    #[inline(always)]
-    fn teeth_of<'t, 'a>(
-        &self,
-        count: usize,
-        tile: &'t mut Tile<'a>,
-    ) -> (Teeth<'t>, &'t mut Work<'a>, &'t mut GapWork<'a>, Shared<'t>) {
-        let teeth = Teeth {
-            count,
-            rows: tile.count / count,
-            len: tile.count.next_multiple_of(LANES),
-            center_radius_mm: tile.center_radius_mm,
-            arm: tile.torque.wave_generator,
-            ring_ratio: tile.force.ring,
-            carrier_ratio: tile.force.carrier,
-            cam_stress: tile.stress.wave_generator,
-            ring_stress: tile.stress.ring,
-            carrier_stress: tile.stress.carrier,
-            stress_exponents: self.pressures.stress_exponents(),
-        };
-        let shared = Shared { force: tile.scale, rotation_rad: tile.row_rotation_rad, stiffness: tile.row_stiffness };
-        (teeth, &mut tile.work, &mut tile.gaps, shared)
-    }
-
-    /// Shares the load among the teeth of each input angle. Returns false if it needs the plain path.
-    #[inline(always)]
-    fn share<V: Simd>(&self, sharing: &Sharing, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) -> bool {
-        let (teeth, work, _, mut shared) = self.teeth_of(count, tile);
-        sharing.share::<V>(loaded.input_torque_nmm() / loaded.zones, &teeth, work, &mut shared)
-    }
-
-    /// Returns the limit of the teeth after load sharing; none if it needs the plain path.
-    #[inline(always)]
-    fn limit<V: Simd>(
-        &self,
-        sharing: &Sharing,
-        allowable_mpa: &PerContact<f64>,
-        count: usize,
-        tile: &mut Tile<'_>,
-    ) -> Option<Limit> {
-        let per_allowable = PerContact::of(|contact| 1.0 / allowable_mpa.get(contact));
-        let (teeth, work, _, _) = self.teeth_of(count, tile);
-        sharing.limit::<V>(&per_allowable, &teeth, work)
-    }
-
     /// Computes torques, stiffness and the number of carrying teeth after load sharing.
     #[inline(always)]
-    fn scale_shared<V: Simd>(&self, loaded: &LoadedDrive<'_>, count: usize, tile: &mut Tile<'_>) {
-        let zones = loaded.zones;
-        let len = tile.count.next_multiple_of(LANES);
+    fn scale_shared<V: Simd>(&self, tile: &mut Tile<'_>) {
+        let (len, zones) = (tile.len(), self.loaded.zones);
         let (scale, root) = (&tile.scale[..len], &mut tile.scale_root[..len]);
         let are_balls = matches!(self.pressures, Pressures::Ellipses(_));
         for i in 0..len {
             root[i] = if are_balls { cube_root::<V>(scale[i]) } else { scale[i].sqrt() };
         }
-        let rows = tile.sum_torques::<false>(count);
+        let rows = tile.sum_torques::<false>();
         let PerContact { wave_generator: cam, ring, carrier } = &mut tile.row_torque;
         let (cam, ring, carrier) = (&mut cam[..rows], &mut ring[..rows], &mut carrier[..rows]);
         let (rotation_rad, stiffness) = (&mut tile.row_rotation_rad[..rows], &mut tile.row_stiffness[..rows]);
-        let lost_motion_rad = self.gaps.as_ref().map_or(0.0, GapColumns::lost_motion_rad);
+        let lost_motion_rad = self.loaded.lost_motion_rad();
         for row in 0..rows {
             cam[row] *= zones;
             ring[row] *= zones;
@@ -165,16 +134,6 @@ impl Kernel {
         }
         tile.row_loaded.clear();
         let carrying = |row: &[f64]| row.iter().filter(|&&force| force > 0.0).count();
-        tile.row_loaded.extend(tile.scale[..tile.count].chunks_exact(count).map(carrying));
-    }
-
-    /// Returns the largest torque residual of a tile and of the earlier ones.
-    #[inline(always)]
-    pub(super) fn residual(balance: &TorqueBalance, rows: usize, tile: &mut Tile<'_>, before: f64) -> f64 {
-        for row in 0..rows {
-            let torque = PerContact::of(|contact| tile.row_torque.get(contact)[row]);
-            tile.row_residual[row] = balance.residual(&torque);
-        }
-        tile.row_residual[..rows].iter().fold(before, |worst, &residual| worse(residual, worst))
+        tile.row_loaded.extend(tile.scale[..tile.count].chunks_exact(tile.teeth).map(carrying));
     }
 }

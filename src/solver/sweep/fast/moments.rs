@@ -4,22 +4,21 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use pulp::Simd;
 
-use super::lanes::LANES;
+use super::Kernel;
 use super::laps::{LapTeeth, Layout, whole};
+use super::loads::Totals;
+use super::sharing::Sharing;
 use super::sinks::PeakSink;
 use super::tile::{Tile, TileSize};
-use super::{Kernel, Law, least};
 use crate::contact::Contact;
-use crate::load_sharing::LoadedDrive;
 use crate::mesh::Mesh;
-use crate::sweep::columns::{AngleExtremes, TorqueBalance, TorqueCapacity};
+use crate::sweep::columns::AngleExtremes;
 use crate::sweep::search::{LOADS, Piece, SearchedDrive, Seen};
 use crate::{SolveError, Stop};
 
 /// Evaluates moments with the kernel.
 pub(super) struct FastLook<'a> {
-    kernel: &'a Kernel,
-    loaded: &'a LoadedDrive<'a>,
+    kernel: &'a Kernel<'a>,
     stop: &'a dyn Stop,
     /// Mesh of the sweep.
     mesh: Mesh,
@@ -27,11 +26,9 @@ pub(super) struct FastLook<'a> {
     lap_teeth: LapTeeth,
     rows: usize,
     tile: Tile<'a>,
-    balance: TorqueBalance,
     /// Base positions of the teeth, for each piece of a lap that was evaluated.
     bases: Vec<Bases>,
-    pub(super) torque_balance_residual: f64,
-    pub(super) capacity: Option<TorqueCapacity>,
+    pub(super) totals: Totals,
     pub(super) angles: AngleExtremes,
 }
 
@@ -75,12 +72,12 @@ impl Bases {
     #[inline(always)]
     fn place(&self, fractions: &[f64], tile: &mut Tile<'_>) {
         let teeth = self.sin.len();
-        tile.count = fractions.len() * teeth;
+        (tile.teeth, tile.count) = (teeth, fractions.len() * teeth);
         tile.last_place = self.last_place;
         for (row, fraction) in fractions.iter().enumerate() {
             let (back_sin, back_cos) = ((self.piece.end - fraction) * self.phase_rad).sin_cos();
             let (on_sin, on_cos) = ((fraction - self.piece.start) * self.phase_rad).sin_cos();
-            let at = row * teeth..(row + 1) * teeth;
+            let at = tile.of_row(row);
             let (sin, cos) = (&mut tile.sin[at.clone()], &mut tile.cos[at.clone()]);
             for i in 0..teeth {
                 let (turn_sin, turn_cos) = if self.is_near_lobe[i] { (back_sin, back_cos) } else { (-on_sin, on_cos) };
@@ -94,100 +91,40 @@ impl Bases {
                 }
             }
         }
-        let rest = tile.count..tile.count.next_multiple_of(LANES);
+        let rest = tile.count..tile.len();
         tile.sin[rest.clone()].fill(FRAC_1_SQRT_2);
         tile.cos[rest].fill(FRAC_1_SQRT_2);
     }
 }
 
 impl<'a> FastLook<'a> {
-    /// Builds the evaluation in an arena of the size's doubles. The drive is loaded over one zone, in which the mesh is
-    /// evaluated.
-    pub(super) fn new(
-        kernel: &'a Kernel,
-        loaded: &'a LoadedDrive<'a>,
-        (mesh, layout): (Mesh, Layout),
-        size: &TileSize,
-        arena: &'a mut [f64],
-        stop: &'a dyn Stop,
-    ) -> Self {
+    /// Builds the evaluation of a mesh, in an empty arena. The kernel's drive is loaded over one zone.
+    pub(super) fn new(kernel: &'a Kernel<'a>, mesh: Mesh, arena: &'a mut Vec<f64>, stop: &'a dyn Stop) -> Self {
+        let (layout, places) = (kernel.layout(&mesh), mesh.teeth_in_mesh().max / mesh.listed_at_each_place());
+        let size = TileSize::anywhere(kernel, layout.at_each_place * whole(places));
+        arena.resize(size.doubles(), 0.0);
         Self {
             kernel,
-            loaded,
             stop,
             mesh,
             layout,
             lap_teeth: LapTeeth::default(),
-            rows: size.rows(),
-            tile: Tile::new(arena, size, 0.0, kernel.pressures.stress_exponents()),
-            balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
+            rows: size.rows,
+            tile: Tile::new(arena, &size, 0.0, kernel.pressures.stress_exponents()),
             bases: Vec::new(),
-            torque_balance_residual: 0.0,
-            capacity: None,
+            totals: Totals::new(kernel.loaded),
             angles: AngleExtremes::NONE,
         }
     }
 
-    /// Computes the loads of a tile of moments. Returns false if the plain path is needed.
-    #[inline(always)]
-    fn work_out<V: Simd>(&mut self, bases: usize, fractions: &[f64], seen: &mut Seen) -> bool {
-        let (kernel, loaded, tile) = (self.kernel, self.loaded, &mut self.tile);
-        self.bases[bases].place(fractions, tile);
-        let teeth = seen.teeth;
-        if !kernel.unit_loads::<V, PeakSink>(tile)
-            || !kernel.prepare::<V>(loaded, teeth, tile)
-            || !kernel.close(&self.mesh, &self.lap_teeth, teeth, tile)
-        {
-            return false;
-        }
-        let limit = kernel.loads::<V>(loaded, teeth, tile, |sharing, work| {
-            if sharing.has_gaps() {
-                (0..fractions.len()).for_each(|row| seen.push_pressed(work.pressed_rad(row, teeth)));
-            }
-        });
-        let Some(limit) = limit else { return false };
-        if let Some(limit) = &limit {
-            let capacity = limit.capacity(loaded, fractions[limit.row] * self.mesh.sweep_period_deg());
-            self.capacity = least(self.capacity, capacity);
-        }
-        self.angles.take(loaded.drive(), tile, fractions.len());
-        self.torque_balance_residual =
-            Kernel::residual(&self.balance, fractions.len(), tile, self.torque_balance_residual);
-        for (row, &fraction) in fractions.iter().enumerate() {
-            let at = row * teeth..(row + 1) * teeth;
-            let (rotation_rad, stiffness) = (tile.row_rotation_rad[row], tile.row_stiffness[row]);
-            let values = seen.push(fraction);
-            let scale = &tile.scale[at.clone()];
-            for (index, contact) in Contact::all().into_iter().enumerate() {
-                let (force, stress) = (&tile.force.get(contact)[at.clone()], &tile.stress.get(contact)[at.clone()]);
-                let forces = &mut values[index * teeth..(index + 1) * teeth];
-                for i in 0..teeth {
-                    forces[i] = force[i] * scale[i];
-                }
-                let root = &tile.stress_scale(contact)[at.clone()];
-                let stresses = &mut values[(index + 3) * teeth..(index + 4) * teeth];
-                for i in 0..teeth {
-                    stresses[i] = stress[i] * root[i];
-                }
-            }
-            let per_capacity = if limit.is_some() { 1.0 / (loaded.zones * tile.work.limits_nmm()[row]) } else { 0.0 };
-            let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
-            values[LOADS * teeth..].copy_from_slice(&totals);
-        }
-        true
-    }
-
     /// Returns what the search needs to know. The kernel has no corners.
     pub(super) fn searched(&self) -> SearchedDrive {
-        let (has_gaps, is_linear) = match &self.kernel.law {
-            Law::Linear(_) => (false, true),
-            Law::Sharing(sharing) => (sharing.has_gaps(), sharing.is_linear()),
-        };
+        let kernel = self.kernel;
         SearchedDrive {
-            has_gaps,
-            is_linear,
-            is_in_proportion: self.kernel.law.is_in_proportion(),
-            input_torque_nmm: self.loaded.input_torque_nmm(),
+            has_gaps: kernel.gaps.is_some(),
+            is_linear: kernel.sharing.as_ref().is_none_or(|sharing| matches!(sharing, Sharing::Linear(_))),
+            is_in_proportion: kernel.is_in_proportion(),
+            input_torque_nmm: kernel.loaded.input_torque_nmm(),
             distance_at_corner_rad: 0.0,
             teeth_at_each_place: self.layout.at_each_place as u64,
         }
@@ -216,7 +153,8 @@ impl<'a> FastLook<'a> {
     }
 }
 
-/// Evaluation in the form that `pulp` needs, as [`super::Vectorised`].
+/// Evaluation of a tile of moments in the form that `pulp` needs, as [`super::Vectorised`]. Returns false if the plain path
+/// is needed.
 struct Looking<'l, 'a> {
     look: &'l mut FastLook<'a>,
     bases: usize,
@@ -229,6 +167,40 @@ impl pulp::WithSimd for Looking<'_, '_> {
 
     #[inline(always)]
     fn with_simd<V: Simd>(self, _: V) -> bool {
-        self.look.work_out::<V>(self.bases, self.fractions, self.seen)
+        let Self { look, bases, fractions, seen } = self;
+        let (kernel, loaded, tile) = (look.kernel, look.kernel.loaded, &mut look.tile);
+        look.bases[bases].place(fractions, tile);
+        let teeth = seen.teeth;
+        if !kernel.unit_loads::<V, PeakSink<'_>>(tile) || !kernel.loads::<V>(&look.mesh, &look.lap_teeth, tile) {
+            return false;
+        }
+        if kernel.gaps.is_some() {
+            (0..fractions.len()).for_each(|row| seen.pressed.extend(tile.work.pressed_rad(row, teeth)));
+        }
+        let Some(limit) = kernel.limit::<V>(tile) else { return false };
+        look.totals.take(loaded, tile, limit.as_ref(), |row| fractions[row] * look.mesh.sweep_period_deg());
+        look.angles.take(loaded.drive(), tile);
+        for (row, &fraction) in fractions.iter().enumerate() {
+            let at = tile.of_row(row);
+            let (rotation_rad, stiffness) = (tile.row_rotation_rad[row], tile.row_stiffness[row]);
+            let values = seen.push(fraction);
+            let scale = &tile.scale[at.clone()];
+            for (index, contact) in Contact::all().into_iter().enumerate() {
+                let (force, stress) = (&tile.force.get(contact)[at.clone()], &tile.stress.get(contact)[at.clone()]);
+                let forces = &mut values[index * teeth..(index + 1) * teeth];
+                for i in 0..teeth {
+                    forces[i] = force[i] * scale[i];
+                }
+                let root = &tile.stress_scale(contact)[at.clone()];
+                let stresses = &mut values[(index + 3) * teeth..(index + 4) * teeth];
+                for i in 0..teeth {
+                    stresses[i] = stress[i] * root[i];
+                }
+            }
+            let per_capacity = if limit.is_some() { 1.0 / (loaded.zones * tile.work.row_limit[row]) } else { 0.0 };
+            let totals = [rotation_rad, 1.0 / rotation_rad, stiffness, 1.0 / stiffness, per_capacity];
+            values[LOADS * teeth..].copy_from_slice(&totals);
+        }
+        true
     }
 }

@@ -40,7 +40,7 @@ impl Pressures {
     /// Returns `E*/(π L1)` of each contact; 1 for balls, whose curvatures are needed first.
     pub(super) fn hertz(&self, loaded: &LoadedDrive<'_>) -> PerContact<f64> {
         PerContact::of(|contact| match self {
-            Self::Lines | Self::Flat(_) => loaded.contacts.hertz.get(contact).modulus_per_width_mpa_per_mm(),
+            Self::Lines | Self::Flat(_) => loaded.contacts.hertz.get(contact).modulus_per_width_mpa_per_mm,
             Self::Ellipses(_) => 1.0,
         })
     }

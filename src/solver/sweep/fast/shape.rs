@@ -1,6 +1,6 @@
 //! Shapes of the wave generator that have a fast path.
 
-use super::centers::{EccentricCenters, HarmonicCenters, HarmonicPathCenters};
+use super::centers::Centers;
 use super::lanes::LANES;
 use crate::cam::{Cam, Ellipse};
 use crate::contact::PerContact;
@@ -14,9 +14,7 @@ const LAST_STEP: f64 = 5e-6;
 /// Shape that determines the centres of the teeth.
 pub(super) enum Shape {
     Ellipse(EllipseShape),
-    Eccentric(EccentricCenters),
-    Harmonic(HarmonicCenters),
-    HarmonicPath(HarmonicPathCenters),
+    Path(Centers),
 }
 
 impl Shape {
@@ -36,18 +34,14 @@ impl Shape {
                 (Self::Ellipse(shape), bounds(ratio, b + r))
             }
             Cam::Harmonic(cam) => {
-                let (path, e) = (cam.mean_radius_mm() + r, cam.amplitude_mm());
-                let shape = if cam.is_circle() {
-                    Self::Eccentric(EccentricCenters::new(cam, r))
-                } else {
-                    Self::Harmonic(HarmonicCenters::new(cam, r))
-                };
-                (shape, off_path(e * f64::from(cam.lobes()) / (path - e), path - e))
+                let (path, e) = (cam.mean_radius_mm + r, cam.amplitude_mm);
+                let centers = if cam.is_circle() { Centers::Eccentric(*cam) } else { Centers::Harmonic(*cam) };
+                (Self::Path(centers), off_path(e * f64::from(cam.lobes) / (path - e), path - e))
             }
             Cam::HarmonicPath(cam) => {
-                let (mean, e) = (cam.mean_radius_mm(), cam.amplitude_mm());
+                let (mean, e) = (cam.mean_radius_mm, cam.amplitude_mm);
                 let steepest = e * cam.lobe_count() / (mean - e);
-                (Self::HarmonicPath(HarmonicPathCenters::new(cam, r)), off_path(steepest, mean - e))
+                (Self::Path(Centers::HarmonicPath(*cam)), off_path(steepest, mean - e))
             }
         })
     }
@@ -65,7 +59,7 @@ pub(super) struct EllipseShape {
 
 impl EllipseShape {
     pub(super) fn new(cam: &Ellipse, r: f64) -> Self {
-        let (a, b) = (cam.semi_major_mm(), cam.semi_minor_mm());
+        let (a, b) = (cam.semi_major_mm, cam.semi_minor_mm);
         let mean = 0.5 * (a + b);
         let (flattening, thickness) = ((a - b) / (a + b), r / mean);
         let round = 1.0 + thickness;

@@ -4,6 +4,9 @@
 //! The springs are those of [`crate::springs`], in columns. With gaps every search approaches the rotation from above.
 //! Each force is convex in the rotation, so the sum of all tangents never exceeds the springs' torque. Its root is at
 //! or beyond the true one. A tooth that is open there is open at the true rotation too.
+//!
+//! The tiles have the loads of 1 N at the wave generator: the torque there is the lever arm `|h'|`, the forces at ring
+//! and carrier are `F_K/F_H` and `F_S/F_H`. Load sharing computes `F_H` in `scale`, `Δφ` and, for one zone, `dM0/dΔφ`.
 
 mod power_law;
 mod two_parts;
@@ -11,13 +14,13 @@ mod two_parts;
 use pulp::Simd;
 
 use super::lanes::repeat_each;
+use super::tile::Tile;
 use crate::contact::{Contact, PerContact};
 use crate::contact_law::{LogarithmicTerm, PALMGREN_EXPONENT, Term, WIDEST_SHARE};
 use crate::load_sharing::{Compatibility, LoadedDrive};
-use crate::tooth::StressExponents;
 
-pub(crate) use power_law::{Hertz, Linear, Palmgren, Power, PowerLaw};
-pub(crate) use two_parts::{Logarithm, NoPowerLaw, PalmgrenAndLinear};
+use power_law::{Hertz, Linear, Palmgren, Power};
+use two_parts::{Logarithm, PalmgrenAndLinear, TwoParts};
 
 /// Largest number of rounds of a search. A tile that needs more uses the plain path.
 const MAX_ROUNDS: u32 = 60;
@@ -33,32 +36,6 @@ const OPEN_TORQUE: f64 = 8.0 * f64::EPSILON;
 /// Replaces zero where a logarithm is needed. No contact has a ratio or a force this small.
 const NOTHING: f64 = 1e-150;
 
-/// Teeth of a tile under 1 N at the wave generator, by input angle and then tooth.
-pub(super) struct Teeth<'a> {
-    /// Number of teeth at an input angle.
-    pub(super) count: usize,
-    /// Number of input angles.
-    pub(super) rows: usize,
-    /// Number of states, including those that fill the last chunk.
-    pub(super) len: usize,
-    /// `d`.
-    pub(super) center_radius_mm: &'a [f64],
-    /// `|h'|`.
-    pub(super) arm: &'a [f64],
-    /// `F_K/F_H`.
-    pub(super) ring_ratio: &'a [f64],
-    /// `F_S/F_H`.
-    pub(super) carrier_ratio: &'a [f64],
-    /// Stress at the wave generator.
-    pub(super) cam_stress: &'a [f64],
-    /// Stress at the ring.
-    pub(super) ring_stress: &'a [f64],
-    /// Stress at the carrier.
-    pub(super) carrier_stress: &'a [f64],
-    /// Powers of the stresses to which forces are proportional.
-    pub(super) stress_exponents: StressExponents,
-}
-
 /// Least torque of a tile under which a contact reaches a stress.
 pub(super) struct Limit {
     /// Torque of one zone.
@@ -69,16 +46,6 @@ pub(super) struct Limit {
     pub(super) row: usize,
 }
 
-/// Result of load sharing.
-pub(super) struct Shared<'a> {
-    /// `F_H`, by state.
-    pub(super) force: &'a mut [f64],
-    /// `Δφ`, by input angle.
-    pub(super) rotation_rad: &'a mut [f64],
-    /// `dM0/dΔφ` of one zone, by input angle.
-    pub(super) stiffness: &'a mut [f64],
-}
-
 /// Working columns.
 pub(super) struct Work<'a> {
     /// Place-dependent part of each tooth's law: c of balls, the compliance of a flat.
@@ -87,7 +54,7 @@ pub(super) struct Work<'a> {
     unit: &'a mut [f64],
     /// Johnson's law: `B`. Otherwise the coefficient of the power.
     growth: &'a mut [f64],
-    /// Rotation at which the gaps of a tooth are closed.
+    /// Rotation at which the gaps of a tooth are closed; zero without gaps, as the tile begins.
     pub(super) closing: &'a mut [f64],
     /// Rotation beyond that; zero or negative if a gap is open.
     pressed: &'a mut [f64],
@@ -106,12 +73,12 @@ pub(super) struct Work<'a> {
     /// Reference closing angle of `excess`, by state: that of the last tooth that carries, so that light loads keep
     /// their digits.
     last: &'a mut [f64],
-    /// `F_H` under a limit.
+    /// `F_H` under a limit; takes the place of `scale` while the limit is searched for.
     limit: &'a mut [f64],
     row_excess: &'a mut [f64],
     row_last: &'a mut [f64],
     /// Torque of one zone under which a contact reaches its limit, by input angle.
-    row_limit: &'a mut [f64],
+    pub(super) row_limit: &'a mut [f64],
     /// Unit of the forces under Johnson's law.
     typical_n: f64,
 }
@@ -147,14 +114,9 @@ impl<'a> Work<'a> {
 
     /// Returns the rotation of each tooth at an input angle beyond its closing angle, after load sharing with gaps. It
     /// is negative if a gap is open.
-    pub(super) fn pressed_rad(&self, row: usize, count: usize) -> impl Iterator<Item = f64> {
+    pub(super) fn pressed_rad(&self, row: usize, teeth: usize) -> impl Iterator<Item = f64> {
         let (last, excess) = (self.row_last[row], self.row_excess[row]);
-        self.closing[row * count..(row + 1) * count].iter().map(move |closing| excess + (last - closing))
-    }
-
-    /// Returns the result of the last search for a limit, by input angle: the torque of one zone.
-    pub(super) const fn limits_nmm(&self) -> &[f64] {
-        self.row_limit
+        self.closing[row * teeth..(row + 1) * teeth].iter().map(move |closing| excess + (last - closing))
     }
 }
 
@@ -170,7 +132,7 @@ pub(super) struct Weights {
 
 impl Weights {
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Self {
-        match loaded.compatibility() {
+        match loaded.compatibility {
             Compatibility::VirtualWork => Self { ring_exponent: 1.0, ring_decline: 0.0, carrier: 1.0 },
             // cos(γ + sβ) and s sin γ, with sin γ = F_S/F_H over Z_G/U.
             Compatibility::Projection => {
@@ -219,29 +181,25 @@ fn start_above(excess_alone: f64, weight: impl Fn(usize) -> f64, closing: &[f64]
 
 /// Computes the rotation of each tooth beyond closure at the rotation of its row.
 #[inline(always)]
-fn press<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>) {
-    let (rows, len) = (teeth.rows, teeth.len);
-    if GAPS {
-        repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
-        repeat_each(&work.row_last[..rows], teeth.count, work.last);
-        let (excess, pressed) = (&work.excess[..len], &mut work.pressed[..len]);
-        let (last, closing) = (&work.last[..len], &work.closing[..len]);
-        for i in 0..len {
-            pressed[i] = excess[i] + (last[i] - closing[i]);
-        }
-    } else {
-        repeat_each(&work.row_excess[..rows], teeth.count, work.pressed);
+fn press(tile: &mut Tile<'_>) {
+    let (rows, len, work) = (tile.rows(), tile.len(), &mut tile.work);
+    repeat_each(&work.row_excess[..rows], tile.teeth, work.excess);
+    repeat_each(&work.row_last[..rows], tile.teeth, work.last);
+    let (excess, pressed) = (&work.excess[..len], &mut work.pressed[..len]);
+    let (last, closing) = (&work.last[..len], &work.closing[..len]);
+    for i in 0..len {
+        pressed[i] = excess[i] + (last[i] - closing[i]);
     }
 }
 
 /// Computes the force at which the first contact of each tooth reaches its allowable stress: `(σ_a/σ)²` for line
 /// contacts.
 #[inline(always)]
-fn forces_at_stress(per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, force: &mut [f64]) {
-    let len = teeth.len;
-    let exponents = teeth.stress_exponents;
-    let (cam, ring) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
-    let (carrier, force) = (&teeth.carrier_stress[..len], &mut force[..len]);
+fn forces_at_stress(per_allowable: &PerContact<f64>, tile: &mut Tile<'_>) {
+    let len = tile.len();
+    let exponents = tile.stress_exponents;
+    let (cam, ring) = (&tile.stress.wave_generator[..len], &tile.stress.ring[..len]);
+    let (carrier, force) = (&tile.stress.carrier[..len], &mut tile.scale[..len]);
     for i in 0..len {
         let (cam, ring) = (cam[i] * per_allowable.wave_generator, ring[i] * per_allowable.ring);
         let carrier = carrier[i] * per_allowable.carrier;
@@ -259,9 +217,9 @@ fn forces_at_stress(per_allowable: &PerContact<f64>, teeth: &Teeth<'_>, force: &
 /// Rotates each row until its first tooth reaches its limit, which is in `work.pressed`. Returns false if a row has no
 /// limit.
 #[inline(always)]
-fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) -> bool {
-    for row in 0..teeth.rows {
-        let at = row * teeth.count..(row + 1) * teeth.count;
+fn turn_to_limit(tile: &mut Tile<'_>) -> bool {
+    for row in 0..tile.rows() {
+        let (at, work) = (tile.of_row(row), &mut tile.work);
         let (closing, pressed) = (&work.closing[at.clone()], &work.pressed[at]);
         let earliest = closing.iter().fold(f64::INFINITY, |earliest, &closing| earliest.min(closing));
         let mut least = f64::INFINITY;
@@ -276,33 +234,30 @@ fn turn_to_limit(teeth: &Teeth<'_>, work: &mut Work<'_>) -> bool {
             return false;
         }
     }
-    press::<true>(teeth, work);
+    press(tile);
     true
 }
 
-/// Returns the least torque of the rows, each at its limit, under these forces.
+/// Returns the least torque of the rows, each at its limit, under the forces there.
 #[inline(always)]
-fn least_torque(
-    per_allowable: &PerContact<f64>,
-    teeth: &Teeth<'_>,
-    work: &mut Work<'_>,
-    force: &[f64],
-) -> Option<Limit> {
+fn least_torque(per_allowable: &PerContact<f64>, tile: &mut Tile<'_>) -> Option<Limit> {
+    let rows = tile.rows();
+    let (work, arm, force) = (&mut tile.work, &*tile.torque.wave_generator, &*tile.scale);
     // Share of 1 N in the force at the allowable stress.
     let shares = |i: usize| {
-        let exponents = teeth.stress_exponents;
+        let exponents = tile.stress_exponents;
         PerContact {
-            wave_generator: exponents.raised(teeth.cam_stress[i] * per_allowable.wave_generator),
-            ring: exponents.raised(teeth.ring_stress[i] * per_allowable.ring),
-            carrier: exponents.raised_at(Contact::Carrier, teeth.carrier_stress[i] * per_allowable.carrier),
+            wave_generator: exponents.raised(tile.stress.wave_generator[i] * per_allowable.wave_generator),
+            ring: exponents.raised(tile.stress.ring[i] * per_allowable.ring),
+            carrier: exponents.raised_at(Contact::Carrier, tile.stress.carrier[i] * per_allowable.carrier),
         }
     };
     let mut least: Option<Limit> = None;
-    for row in 0..teeth.rows {
-        let at = row * teeth.count..(row + 1) * teeth.count;
+    for row in 0..rows {
+        let at = row * tile.teeth..(row + 1) * tile.teeth;
         let mut torque_nmm = 0.0;
         for i in at.clone() {
-            torque_nmm += if work.pressed[i] > 0.0 { teeth.arm[i] * force[i] } else { 0.0 };
+            torque_nmm += if work.pressed[i] > 0.0 { arm[i] * force[i] } else { 0.0 };
         }
         work.row_limit[row] = torque_nmm;
         if least.as_ref().is_none_or(|least| torque_nmm < least.torque_nmm) {
@@ -310,7 +265,7 @@ fn least_torque(
                 let PerContact { wave_generator, ring, carrier } = shares(i);
                 wave_generator.max(ring).max(carrier) * if work.pressed[i] > 0.0 { force[i] } else { 0.0 }
             };
-            let at_limit = at.clone().max_by(|one, other| share(one).total_cmp(&share(other)))?;
+            let at_limit = at.max_by(|one, other| share(one).total_cmp(&share(other)))?;
             let PerContact { wave_generator, ring, carrier } = shares(at_limit);
             let contact = if carrier > wave_generator.max(ring) {
                 Contact::Carrier
@@ -327,11 +282,11 @@ fn least_torque(
 
 /// Conversion of unit loads to loads.
 pub(super) enum Sharing {
-    Linear(PowerLaw<Linear>),
-    Palmgren(PowerLaw<Palmgren>),
-    Hertz(PowerLaw<Hertz>),
-    PalmgrenAndLinear(NoPowerLaw<PalmgrenAndLinear>),
-    Logarithmic(NoPowerLaw<Logarithm>),
+    Linear(Linear),
+    Palmgren(Palmgren),
+    Hertz(Hertz),
+    PalmgrenAndLinear(PalmgrenAndLinear),
+    Logarithmic(Logarithm),
 }
 
 impl Sharing {
@@ -339,7 +294,7 @@ impl Sharing {
     /// only its series compliance.
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Option<Self> {
         let contacts = loaded.contacts_in_columns()?;
-        let (weights, has_gaps) = (Weights::new(loaded), !loaded.gaps.is_nil());
+        let weights = Weights::new(loaded);
         let series = contacts.series_compliance_mm_per_n;
         let is_alone = series.iter().all(|(_, &compliance)| compliance == 0.0);
         let PerContact { wave_generator, ring, carrier } = contacts.law;
@@ -348,8 +303,9 @@ impl Sharing {
             return None;
         }
         match (wave_generator, ring, carrier) {
-            _ if contacts.ball(Contact::WaveGenerator).is_some() => (is_alone && wave_generator == Term::Ellipse)
-                .then_some(Self::Hertz(PowerLaw { power: Hertz, has_gaps })),
+            _ if contacts.ball(Contact::WaveGenerator).is_some() => {
+                (is_alone && wave_generator == Term::Ellipse).then_some(Self::Hertz(Hertz))
+            }
             (
                 Term::Linear { compliance_mm_per_n: wave_generator },
                 Term::Linear { compliance_mm_per_n: ring },
@@ -362,10 +318,10 @@ impl Sharing {
                     ring: ring + series.ring,
                     carrier: carrier + series.carrier,
                 };
-                Some(Self::Linear(PowerLaw { power: Linear { compliance_mm_per_n, weights }, has_gaps }))
+                Some(Self::Linear(Linear { compliance_mm_per_n, weights }))
             }
             (Term::Power { coefficient, .. }, ..) if is_alone && wave_generator == ring && ring == carrier => {
-                Some(Self::Palmgren(PowerLaw { power: Palmgren { coefficient, weights }, has_gaps }))
+                Some(Self::Palmgren(Palmgren { coefficient, weights }))
             }
             (
                 Term::Power { coefficient: wave_generator, .. },
@@ -374,13 +330,12 @@ impl Sharing {
             ) => {
                 let carrier = if let Term::Power { coefficient, .. } = carrier { coefficient } else { 0.0 };
                 let coefficient = PerContact { wave_generator, ring, carrier };
-                let law = PalmgrenAndLinear { coefficient, compliance: series, weights };
-                Some(Self::PalmgrenAndLinear(NoPowerLaw { law, has_gaps }))
+                Some(Self::PalmgrenAndLinear(PalmgrenAndLinear { coefficient, compliance: series, weights }))
             }
             (Term::Logarithmic(wave_generator), Term::Logarithmic(ring), Term::Logarithmic(_) | Term::Flat) => {
                 let carrier = if let Term::Logarithmic(line) = carrier { line } else { LogarithmicTerm::NONE };
-                let law = Logarithm::new(loaded, &PerContact { wave_generator, ring, carrier }, &series);
-                Some(Self::Logarithmic(NoPowerLaw { law, has_gaps }))
+                let law = PerContact { wave_generator, ring, carrier };
+                Some(Self::Logarithmic(Logarithm::new(loaded, &law, &series)))
             }
             _ => None,
         }
@@ -388,74 +343,49 @@ impl Sharing {
 
     /// Computes the place-dependent part of the law, independent of the gaps.
     #[inline(always)]
-    pub(super) fn prepare<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
+    pub(super) fn prepare<V: Simd>(&self, torque_nmm: f64, tile: &mut Tile<'_>) {
         match self {
-            Self::Linear(law) => law.power.units::<V>(teeth, work.given, work.unit),
-            Self::Palmgren(law) => law.power.units::<V>(teeth, work.given, work.unit),
-            Self::Hertz(law) => law.power.units::<V>(teeth, work.given, work.unit),
-            Self::PalmgrenAndLinear(law) => law.prepare::<V>(torque_nmm, teeth, work),
-            Self::Logarithmic(law) => law.prepare::<V>(torque_nmm, teeth, work),
+            Self::Linear(law) => law.units::<V>(tile),
+            Self::Palmgren(law) => law.units::<V>(tile),
+            Self::Hertz(law) => law.units::<V>(tile),
+            Self::PalmgrenAndLinear(law) => law.prepare::<V>(torque_nmm, tile),
+            Self::Logarithmic(law) => law.prepare::<V>(torque_nmm, tile),
         }
     }
 
     /// Computes the forces that balance the torque of one zone, with the closing angles in `work`. Returns false if
     /// they are not found or the law ends.
     #[inline(always)]
-    pub(super) fn share<V: Simd>(
-        &self,
-        torque_nmm: f64,
-        teeth: &Teeth<'_>,
-        work: &mut Work<'_>,
-        shared: &mut Shared<'_>,
-    ) -> bool {
+    pub(super) fn share<V: Simd>(&self, torque_nmm: f64, has_gaps: bool, tile: &mut Tile<'_>) -> bool {
         match self {
-            Self::Linear(law) => law.share::<V>(torque_nmm, teeth, work, shared),
-            Self::Palmgren(law) => law.share::<V>(torque_nmm, teeth, work, shared),
-            Self::Hertz(law) => law.share::<V>(torque_nmm, teeth, work, shared),
-            Self::PalmgrenAndLinear(law) => law.share::<V>(torque_nmm, teeth, work, shared),
-            Self::Logarithmic(law) => law.share::<V>(torque_nmm, teeth, work, shared),
-        }
-    }
-}
-
-impl Sharing {
-    /// Returns true if teeth begin and cease to carry between their entry and their exit.
-    pub(super) const fn has_gaps(&self) -> bool {
-        match self {
-            Self::Linear(law) => law.has_gaps,
-            Self::Palmgren(law) => law.has_gaps,
-            Self::Hertz(law) => law.has_gaps,
-            Self::PalmgrenAndLinear(law) => law.has_gaps,
-            Self::Logarithmic(law) => law.has_gaps,
+            Self::Linear(law) => law.share::<V>(torque_nmm, has_gaps, tile),
+            Self::Palmgren(law) => law.share::<V>(torque_nmm, has_gaps, tile),
+            Self::Hertz(law) => law.share::<V>(torque_nmm, has_gaps, tile),
+            Self::PalmgrenAndLinear(law) => law.share::<V>(torque_nmm, tile),
+            Self::Logarithmic(law) => law.share::<V>(torque_nmm, tile),
         }
     }
 
-    /// Returns true if forces are proportional to displacements.
-    pub(super) const fn is_linear(&self) -> bool {
-        matches!(self, Self::Linear(_))
-    }
-
-    /// Returns true if all loads are proportional, whatever the torque.
-    pub(super) const fn is_in_proportion(&self) -> bool {
-        !matches!(self, Self::PalmgrenAndLinear(_) | Self::Logarithmic(_)) && !self.has_gaps()
+    /// Returns true if all loads without gaps are proportional, whatever the torque.
+    pub(super) const fn is_power_law(&self) -> bool {
+        !matches!(self, Self::PalmgrenAndLinear(_) | Self::Logarithmic(_))
     }
 
     /// Returns the least torque of one zone in the tile under which a contact reaches a stress, after load sharing.
     /// Returns none if it is not found or the law ends before.
     #[inline(always)]
-    pub(super) fn limit<V: Simd>(
-        &self,
-        per_allowable: &PerContact<f64>,
-        teeth: &Teeth<'_>,
-        work: &mut Work<'_>,
-    ) -> Option<Limit> {
-        match self {
-            Self::Linear(law) => law.limit::<V>(per_allowable, teeth, work),
-            Self::Palmgren(law) => law.limit::<V>(per_allowable, teeth, work),
-            Self::Hertz(law) => law.limit::<V>(per_allowable, teeth, work),
-            Self::PalmgrenAndLinear(law) => law.limit::<V>(per_allowable, teeth, work),
-            Self::Logarithmic(law) => law.limit::<V>(per_allowable, teeth, work),
-        }
+    pub(super) fn limit<V: Simd>(&self, per_allowable: &PerContact<f64>, tile: &mut Tile<'_>) -> Option<Limit> {
+        // The law works on `scale`, which holds forces at the limit meanwhile.
+        std::mem::swap(&mut tile.scale, &mut tile.work.limit);
+        let limit = match self {
+            Self::Linear(law) => law.limit::<V>(per_allowable, tile),
+            Self::Palmgren(law) => law.limit::<V>(per_allowable, tile),
+            Self::Hertz(law) => law.limit::<V>(per_allowable, tile),
+            Self::PalmgrenAndLinear(law) => law.limit::<V>(per_allowable, tile),
+            Self::Logarithmic(law) => law.limit::<V>(per_allowable, tile),
+        };
+        std::mem::swap(&mut tile.scale, &mut tile.work.limit);
+        limit
     }
 }
 

@@ -3,27 +3,27 @@
 use std::iter::zip;
 use std::ops::Range;
 
-use super::Filled;
 use super::lanes::{first_product, largest, largest_product, repeat_each};
-use super::laps::{LapTeeth, Laps, Listed, Stretch, whole};
+use super::laps::{LapTeeth, Laps, whole};
+use super::loads::Totals;
 use super::tile::Tile;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
 use crate::mesh::Place;
-use crate::sweep::columns::{AngleExtremes, ContactPeaks, InputAngles, Peak, PeaksSoFar, States, Sweep, SweepPeaks};
+use crate::sweep::columns::{AngleExtremes, ContactPeaks, InputAngles, Peak, PeaksSoFar, States, Sweep};
 
 /// Receives tiles, in order.
 pub(super) trait Sink {
     /// True if it uses more of a state than its loads.
     const COLUMNS: bool;
 
-    /// Receives a tile with this many teeth at each input angle, starting at a sample. If the teeth of all zones are
-    /// listed, `listed` contains those of its lap.
-    fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize, sample: u64, listed: &LapTeeth);
+    /// Receives a tile that starts at a sample. If the teeth of all zones are listed, `listed` contains those of its lap.
+    fn take(&mut self, tile: &mut Tile<'_>, sample: u64, listed: &LapTeeth);
 }
 
 /// Receives all columns.
 pub(super) struct ColumnSink<'a> {
+    drive: &'a Drive,
     laps: &'a Laps,
     states: States,
     input_angles: InputAngles,
@@ -32,43 +32,52 @@ pub(super) struct ColumnSink<'a> {
 }
 
 impl<'a> ColumnSink<'a> {
-    pub(super) fn new(laps: &'a Laps) -> Self {
-        let (states, samples) = (laps.state_count(), laps.sample_count());
+    pub(super) fn new(drive: &'a Drive, laps: &'a Laps) -> Self {
+        let states = whole(laps.mesh.state_count(laps.samples));
+        let samples = whole(laps.mesh.last_sample(laps.samples) + 1);
         let (states, input_angles) = if laps.are_listed() {
             (States::of_zeros(states), InputAngles::of_zeros(samples))
         } else {
             (States::with_capacity(states, false), InputAngles::with_capacity(samples))
         };
-        Self { laps, states, input_angles, peaks: PerContact::default() }
+        Self { drive, laps, states, input_angles, peaks: PerContact::default() }
     }
 
     /// Returns the sweep, to be checked. If one zone represents all, the last input angle repeats the first, every tooth
     /// one number higher.
-    pub(super) fn sweep(self, drive: &Drive, Filled { torque_balance_residual, torque_capacity }: Filled) -> Sweep {
-        let Self { laps, mut states, mut input_angles, peaks } = self;
+    pub(super) fn sweep(self, totals: &Totals) -> Sweep {
+        let Self { drive, laps, mut states, mut input_angles, peaks } = self;
         let peaks = PerContact::of(|contact| {
             let (force_n, stress_mpa) = (states.force_n.get(contact), states.stress_mpa.get(contact));
             let [of_force, of_stress] = peaks.get(contact);
             let (force_at, stress_at) = (of_force.find(force_n), of_stress.find(stress_mpa));
             let (force_peak_n, stress_peak_mpa) = (states.peak(force_n, force_at), states.peak(stress_mpa, stress_at));
-            ContactPeaks::of_line(force_peak_n, stress_peak_mpa, force_n[stress_at], drive.tooth_width_mm())
+            let force_at_stress_n = force_n[stress_at];
+            let peaks = PeaksSoFar { force_n: force_peak_n, stress_mpa: stress_peak_mpa, force_at_stress_n };
+            peaks.of_line(drive.tooth_width_mm())
         });
         if !laps.are_listed() {
             let end_deg = laps.input_angle_deg(laps.of_lap.count());
-            states.repeat_first(laps.mesh().teeth_at(0, laps.of_lap).count(), end_deg);
+            states.repeat_first(laps.mesh.teeth_at(0, laps.of_lap).count(), end_deg);
             input_angles.repeat_first(end_deg);
         }
-        let mesh = *laps.mesh();
-        let period_closure_residual = 0.0;
-        Sweep { mesh, states, input_angles, peaks, torque_capacity, torque_balance_residual, period_closure_residual }
+        Sweep {
+            mesh: laps.mesh,
+            states,
+            input_angles,
+            peaks,
+            torque_capacity: totals.torque_capacity,
+            torque_balance_residual: totals.torque_balance_residual,
+            period_closure_residual: 0.0,
+        }
     }
 
     /// Puts the teeth of all zones into their listed order.
     #[inline(always)]
-    fn list(&mut self, drive: &Drive, tile: &Tile<'_>, teeth: usize, sample: u64, lap: &LapTeeth) {
-        let Self { laps, states, input_angles, peaks } = self;
-        let rows = tile.count / teeth;
-        let listed = lap.listed.iter().map(Listed::count).sum::<usize>();
+    fn list(&mut self, tile: &Tile<'_>, sample: u64, lap: &LapTeeth) {
+        let Self { drive, laps, states, input_angles, peaks } = self;
+        let (rows, teeth) = (tile.rows(), tile.teeth);
+        let listed = lap.listed.iter().map(|run| run.at.len()).sum::<usize>();
         let of_rows = whole(sample)..whole(sample) + rows;
         input_angles.input_angle_deg[of_rows.clone()].copy_from_slice(&tile.row_input_angle_deg[..rows]);
         for (row, at) in of_rows.enumerate() {
@@ -81,11 +90,14 @@ impl<'a> ColumnSink<'a> {
         }
         let start = laps.states_before(sample);
         let all = start..start + rows * listed;
-        repeat_rows(&tile.row_input_angle_deg[..rows], listed, &mut states.input_angle_deg[all.clone()]);
+        let angles_of_rows = states.input_angle_deg[all.clone()].chunks_exact_mut(listed);
+        for (column, &angle_deg) in angles_of_rows.zip(&*tile.row_input_angle_deg) {
+            column.fill(angle_deg);
+        }
         let mut at = start;
         for run in &lap.listed {
-            let Place { slot, lobe, .. } = run.place(laps.mesh(), 0);
-            let of_run = at..at + run.count();
+            let Place { slot, lobe, .. } = laps.mesh.place_of(&run.teeth, 0);
+            let of_run = at..at + run.at.len();
             let numbers = u32::try_from(slot).unwrap_or(u32::MAX)..;
             states.tooth[of_run.clone()].iter_mut().zip(numbers).for_each(|(tooth, number)| *tooth = number);
             states.lobe[of_run.clone()].fill(u32::try_from(lobe).unwrap_or(u32::MAX));
@@ -131,8 +143,8 @@ fn for_each_stretch(
     lap: &LapTeeth,
     mut each: impl FnMut(&mut [f64], Range<usize>),
 ) {
-    if let [Stretch { at: 0, count }] = lap.stretches[..]
-        && count == teeth
+    if let [row] = &lap.stretches[..]
+        && *row == (0..teeth)
     {
         let all = 0..column.len();
         each(column, all);
@@ -140,19 +152,10 @@ fn for_each_stretch(
     }
     for (row, mut column) in column.chunks_exact_mut(listed).enumerate() {
         for stretch in &lap.stretches {
-            let (of_stretch, rest) = column.split_at_mut(stretch.count);
-            let at = row * teeth + stretch.at;
-            each(of_stretch, at..at + stretch.count);
+            let (of_stretch, rest) = column.split_at_mut(stretch.len());
+            each(of_stretch, row * teeth + stretch.start..row * teeth + stretch.end);
             column = rest;
         }
-    }
-}
-
-/// Writes the value of each row for every tooth in it.
-#[inline(always)]
-fn repeat_rows(values: &[f64], listed: usize, column: &mut [f64]) {
-    for (column, &value) in column.chunks_exact_mut(listed).zip(values) {
-        column.fill(value);
     }
 }
 
@@ -160,20 +163,19 @@ impl Sink for ColumnSink<'_> {
     const COLUMNS: bool = true;
 
     #[inline(always)]
-    fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize, sample: u64, listed: &LapTeeth) {
+    fn take(&mut self, tile: &mut Tile<'_>, sample: u64, listed: &LapTeeth) {
         if self.laps.are_listed() {
-            self.list(drive, tile, teeth, sample, listed);
+            self.list(tile, sample, listed);
             return;
         }
-        let (count, rows) = (tile.count, tile.count / teeth);
-        self.input_angles.extend(
-            drive,
-            &tile.row_input_angle_deg[..rows],
-            &tile.row_rotation_rad[..rows],
-            tile.row_stiffness[..rows].iter().copied(),
-            tile.row_loaded.iter().copied(),
-        );
-        repeat_each(&tile.row_input_angle_deg[..rows], teeth, tile.input_angle_deg);
+        let (count, rows, angles) = (tile.count, tile.rows(), &mut self.input_angles);
+        angles.input_angle_deg.extend_from_slice(&tile.row_input_angle_deg[..rows]);
+        angles.wind_up_deg.extend(tile.row_rotation_rad[..rows].iter().map(|rotation_rad| rotation_rad.to_degrees()));
+        let stiffness =
+            tile.row_stiffness[..rows].iter().map(|&stiffness| InputAngles::of_output(self.drive, stiffness));
+        angles.torsional_stiffness_nm_per_rad.extend(stiffness);
+        angles.loaded_teeth.extend(tile.row_loaded.iter().map(|&teeth| u32::try_from(teeth).unwrap_or(u32::MAX)));
+        repeat_each(&tile.row_input_angle_deg[..rows], tile.teeth, tile.input_angle_deg);
         let states = &mut self.states;
         states.input_angle_deg.extend_from_slice(&tile.input_angle_deg[..count]);
         states.tooth.extend_from_slice(&tile.tooth[..count]);
@@ -225,8 +227,8 @@ impl RunningPeak {
 impl AngleExtremes {
     /// Includes the extremes of a tile.
     #[inline(always)]
-    pub(super) fn take(&mut self, drive: &Drive, tile: &Tile<'_>, rows: usize) {
-        for row in 0..rows {
+    pub(super) fn take(&mut self, drive: &Drive, tile: &Tile<'_>) {
+        for row in 0..tile.rows() {
             let stiffness = InputAngles::of_output(drive, tile.row_stiffness[row]);
             self.see(tile.row_rotation_rad[row].to_degrees(), stiffness, tile.row_loaded[row] as u64);
         }
@@ -234,36 +236,36 @@ impl AngleExtremes {
 }
 
 /// Receives peaks only.
-pub(super) struct PeakSink {
+pub(super) struct PeakSink<'a> {
+    drive: &'a Drive,
     contacts: PerContact<PeaksSoFar>,
-    angles: AngleExtremes,
+    pub(super) angles: AngleExtremes,
 }
 
-impl PeakSink {
-    pub(super) fn new() -> Self {
-        Self { contacts: PerContact::of(|_| PeaksSoFar::NONE), angles: AngleExtremes::NONE }
+impl<'a> PeakSink<'a> {
+    pub(super) fn new(drive: &'a Drive) -> Self {
+        Self { drive, contacts: PerContact::of(|_| PeaksSoFar::NONE), angles: AngleExtremes::NONE }
     }
 
-    pub(super) fn peaks(self, drive: &Drive, torque_balance_residual: f64) -> SweepPeaks {
-        let contacts = PerContact::of(|contact| self.contacts.get(contact).of_line(drive.tooth_width_mm()));
-        self.angles.peaks(contacts, None, torque_balance_residual)
+    pub(super) fn contact_peaks(&self) -> PerContact<ContactPeaks> {
+        PerContact::of(|contact| self.contacts.get(contact).of_line(self.drive.tooth_width_mm()))
     }
 }
 
-impl Sink for PeakSink {
+impl Sink for PeakSink<'_> {
     const COLUMNS: bool = false;
 
     #[inline(always)]
-    fn take(&mut self, drive: &Drive, tile: &mut Tile<'_>, teeth: usize, _: u64, _: &LapTeeth) {
-        let (count, rows) = (tile.count, tile.count / teeth);
-        self.angles.take(drive, tile, rows);
+    fn take(&mut self, tile: &mut Tile<'_>, _: u64, _: &LapTeeth) {
+        let count = tile.count;
+        self.angles.take(self.drive, tile);
         for contact in Contact::all() {
             let (force, scale) = (&tile.force.get(contact)[..count], &tile.scale[..count]);
             let (stress, root) = (&tile.stress.get(contact)[..count], &tile.stress_scale(contact)[..count]);
             let peaks = self.contacts.get_mut(contact);
             let peak = |value: f64, at: usize| Peak {
                 value,
-                input_angle_deg: tile.row_input_angle_deg[at / teeth],
+                input_angle_deg: tile.row_input_angle_deg[at / tile.teeth],
                 position_deg: tile.position_deg_of(at),
             };
             let force_n = largest_product(force, scale);
@@ -286,21 +288,17 @@ impl States {
         self.tooth.extend_from_within(..teeth);
         let last = self.tooth.len() - teeth;
         self.tooth[last..].iter_mut().for_each(|tooth| *tooth += 1);
-        let PerContact { wave_generator: force_h, ring: force_k, carrier: force_s } = &mut self.force_n;
-        let PerContact { wave_generator: stress_h, ring: stress_k, carrier: stress_s } = &mut self.stress_mpa;
         for column in [
             &mut self.position_deg,
             &mut self.center_radius_mm,
             &mut self.wave_generator_angle_deg,
             &mut self.ring_angle_deg,
-            force_h,
-            force_k,
-            force_s,
-            stress_h,
-            stress_k,
-            stress_s,
         ] {
             column.extend_from_within(..teeth);
+        }
+        for contact in Contact::all() {
+            self.force_n.get_mut(contact).extend_from_within(..teeth);
+            self.stress_mpa.get_mut(contact).extend_from_within(..teeth);
         }
     }
 }

@@ -4,36 +4,40 @@ use std::f64::consts::PI;
 
 use pulp::Simd;
 
+use super::Kernel;
 use super::centers::{CenterLanes, Centers};
 use super::lanes::{LANES, arctangents};
 use super::pressures::Pressures;
 use super::shape::{EllipseShape, Shape};
 use super::sinks::Sink;
 use super::tile::{Tile, TileLanes};
-use super::unit::{Newton, Unit};
-use super::{Kernel, Law};
+use super::unit::stress_of;
 
-impl Kernel {
-    /// Computes geometry and unit loads of all states of a tile. Returns false if a support takes too many steps.
+impl Kernel<'_> {
+    /// Computes all of a tile that depends on places only: geometry, unit loads, law and gaps. Returns false if it needs
+    /// the plain path.
     #[inline(always)]
     pub(super) fn unit_loads<V: Simd, K: Sink>(&self, tile: &mut Tile<'_>) -> bool {
-        let are_found = match (&self.law, &self.pressures) {
-            (Law::Linear(compliance), _) => self.loads_of::<K>(*compliance, tile),
-            (Law::Sharing(_), Pressures::Ellipses(_)) => self.loads_of::<K>(Newton::<true>, tile),
-            (Law::Sharing(_), _) => self.loads_of::<K>(Newton::<false>, tile),
+        let are_found = if matches!(self.pressures, Pressures::Ellipses(_)) {
+            self.loads_of::<K, true>(tile)
+        } else {
+            self.loads_of::<K, false>(tile)
         };
-        are_found && self.pressures.finish::<V>(tile)
+        if !are_found || !self.pressures.finish::<V>(tile) {
+            return false;
+        }
+        let Some(sharing) = &self.sharing else { return true };
+        sharing.prepare::<V>(self.torque_of_zone_nmm(), tile);
+        self.gaps.as_ref().is_none_or(|gaps| gaps.prepare(tile))
     }
 
     #[inline(always)]
-    fn loads_of<K: Sink>(&self, unit: impl Unit, tile: &mut Tile<'_>) -> bool {
+    fn loads_of<K: Sink, const BALLS: bool>(&self, tile: &mut Tile<'_>) -> bool {
         // A plain loop: an iterator's method would not be compiled for these vectors.
         for chunk in 0..tile.count.div_ceil(LANES) {
             let are_found = match &self.shape {
-                Shape::Ellipse(ellipse) => self.on_ellipse::<K>(ellipse, unit, tile, chunk),
-                Shape::Eccentric(centers) => self.on_path::<K>(centers, unit, tile, chunk),
-                Shape::Harmonic(centers) => self.on_path::<K>(centers, unit, tile, chunk),
-                Shape::HarmonicPath(centers) => self.on_path::<K>(centers, unit, tile, chunk),
+                Shape::Ellipse(ellipse) => self.on_ellipse::<K, BALLS>(ellipse, tile, chunk),
+                Shape::Path(centers) => self.on_path::<K, BALLS>(centers, tile, chunk),
             };
             if !are_found {
                 return false;
@@ -44,11 +48,16 @@ impl Kernel {
 
     /// Computes geometry and unit loads of a chunk of states. Returns false if the support takes too many steps.
     #[inline(always)]
-    fn on_ellipse<K: Sink>(&self, ellipse: &EllipseShape, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
+    fn on_ellipse<K: Sink, const BALLS: bool>(
+        &self,
+        ellipse: &EllipseShape,
+        tile: &mut Tile<'_>,
+        chunk: usize,
+    ) -> bool {
         let TileLanes { sin, cos, force, stress, torque } = tile.lanes(chunk);
         let Some(support) = ellipse.supports(sin, cos) else { return false };
         let EllipseShape { a, b, r, difference_of_squares, .. } = *ellipse;
-        let k = self.ring_teeth_per_wave;
+        let (k, unit) = (self.ring_teeth_per_wave, self.unit);
 
         let mut center_radius = [0.0; LANES];
         let mut cam_ratio = [0.0; LANES];
@@ -105,9 +114,9 @@ impl Kernel {
             force.ring[i] = force_k;
             force.carrier[i] = force_s;
             let cam_curvature = tooth_curvature + cube * per_squares;
-            stress.wave_generator[i] = unit.stress(force_h, cam_curvature * self.hertz.wave_generator, 1.0);
-            stress.ring[i] = unit.stress(force_k, e3_d * per_regular, ring_hertz);
-            stress.carrier[i] = unit.stress(force_s, 1.0, carrier_hertz);
+            stress.wave_generator[i] = stress_of::<BALLS>(force_h, cam_curvature * self.hertz.wave_generator, 1.0);
+            stress.ring[i] = stress_of::<BALLS>(force_k, e3_d * per_regular, ring_hertz);
+            stress.carrier[i] = stress_of::<BALLS>(force_s, 1.0, carrier_hertz);
             torque.wave_generator[i] = force_h * lever;
             torque.ring[i] = force_k * (d * k * lever * per_e);
             torque.carrier[i] = force_s * d;
@@ -122,12 +131,12 @@ impl Kernel {
     /// The same for other wave generators, from their centres: `cos γ = 1/V`, `V² = 1 + T²`, and `cos β = 1/W`,
     /// `W² = 1 + k²T²`.
     #[inline(always)]
-    fn on_path<K: Sink>(&self, centers: &impl Centers, unit: impl Unit, tile: &mut Tile<'_>, chunk: usize) -> bool {
+    fn on_path<K: Sink, const BALLS: bool>(&self, centers: &Centers, tile: &mut Tile<'_>, chunk: usize) -> bool {
         let TileLanes { sin, cos, force, stress, torque } = tile.lanes(chunk);
-        let Some(CenterLanes { radius_mm, tan, tan_derivative, cam_curvature_per_mm }) = centers.at(sin, cos) else {
+        let Self { r, ring_teeth_per_wave: k, unit, .. } = *self;
+        let Some(CenterLanes { radius_mm, tan, tan_derivative, cam_curvature_per_mm }) = centers.at(r, sin, cos) else {
             return false;
         };
-        let Self { r, ring_teeth_per_wave: k, .. } = *self;
 
         let mut cam_ratio = [0.0; LANES];
         let mut ring_ratio = [0.0; LANES];
@@ -157,9 +166,9 @@ impl Kernel {
             force.ring[i] = force_k;
             force.carrier[i] = force_s;
             let curvature = tooth_curvature + cam_curvature_per_mm[i];
-            stress.wave_generator[i] = unit.stress(force_h, curvature * self.hertz.wave_generator, 1.0);
-            stress.ring[i] = unit.stress(force_k, flat * per_regular, ring_hertz);
-            stress.carrier[i] = unit.stress(force_s, 1.0, carrier_hertz);
+            stress.wave_generator[i] = stress_of::<BALLS>(force_h, curvature * self.hertz.wave_generator, 1.0);
+            stress.ring[i] = stress_of::<BALLS>(force_k, flat * per_regular, ring_hertz);
+            stress.carrier[i] = stress_of::<BALLS>(force_s, 1.0, carrier_hertz);
             torque.wave_generator[i] = force_h * lever;
             // F_K sin β, with F_K cos β = F_H cos γ.
             torque.ring[i] = force_h * (cos_gamma * ring_tan) * d;
@@ -181,13 +190,7 @@ impl Kernel {
 
     /// Stores the angles of contact points, given the tangents of their angles to the position.
     #[inline(always)]
-    pub(super) fn place(
-        &self,
-        tile: &mut Tile<'_>,
-        chunk: usize,
-        mut cam_ratio: [f64; LANES],
-        mut ring_ratio: [f64; LANES],
-    ) {
+    fn place(&self, tile: &mut Tile<'_>, chunk: usize, mut cam_ratio: [f64; LANES], mut ring_ratio: [f64; LANES]) {
         let from_valley = &tile.from_valley_rad.as_chunks::<LANES>().0[chunk];
         let cam_angle_deg = &mut tile.wave_generator_angle_deg.as_chunks_mut::<LANES>().0[chunk];
         let ring_angle_deg = &mut tile.ring_angle_deg.as_chunks_mut::<LANES>().0[chunk];

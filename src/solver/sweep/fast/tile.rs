@@ -3,8 +3,10 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::iter::zip;
+use std::ops::Range;
 
-use super::gaps::GapWork;
+use super::Kernel;
+use super::gaps::{GapColumns, GapWork};
 use super::lanes::{LANES, VECTOR};
 use super::laps::{Laps, Layout, whole};
 use super::sharing::Work;
@@ -60,17 +62,12 @@ pub(super) struct Run {
     of: Samples,
     /// Distance of successive samples.
     stride: u64,
-    places: usize,
+    pub(super) places: usize,
     pub(super) teeth: usize,
     layout: Layout,
     /// Number of samples of a tile, except the last.
     rows: usize,
     mesh: Mesh,
-    /// Step of the phase.
-    step_rad: f64,
-    /// Number of steps of a whole turn.
-    steps: f64,
-    lobes: f64,
 }
 
 impl Run {
@@ -82,20 +79,7 @@ impl Run {
         let teeth = layout.at_each_place * places;
         let count = whole((end - first).div_ceil(stride));
         let rows = count.div_ceil(count.div_ceil((TILE / teeth).max(1)));
-        Self {
-            first,
-            end,
-            of,
-            stride,
-            places,
-            teeth,
-            layout,
-            rows,
-            mesh: *mesh,
-            step_rad: mesh.phase_step_rad(of),
-            steps: mesh.steps(of) as f64,
-            lobes: f64::from(mesh.lobe_count()),
-        }
+        Self { first, end, of, stride, places, teeth, layout, rows, mesh: *mesh }
     }
 
     /// Returns the first samples of its tiles.
@@ -106,10 +90,6 @@ impl Run {
     /// Returns the first sample beyond it.
     pub(super) const fn next(&self) -> u64 {
         self.first + (self.end - self.first).div_ceil(self.stride) * self.stride
-    }
-
-    pub(super) const fn places(&self) -> usize {
-        self.places
     }
 
     /// Computes the pattern of its tiles.
@@ -148,10 +128,11 @@ impl Run {
     #[inline(always)]
     pub(super) fn place(&self, start: u64, tile: &mut Tile<'_>) {
         let rows = self.rows.min(whole((self.end - start).div_ceil(self.stride)));
-        tile.count = rows * self.teeth;
-        let len = tile.count.next_multiple_of(LANES);
+        (tile.teeth, tile.count) = (self.teeth, rows * self.teeth);
+        let len = tile.len();
         let passed = start as f64;
-        let (turn_sin, turn_cos) = ((start - self.first) as f64 * self.step_rad).sin_cos();
+        let turn_rad = (start - self.first) as f64 * self.mesh.phase_step_rad(self.of);
+        let (turn_sin, turn_cos) = turn_rad.sin_cos();
         let (pattern_sin, pattern_cos) = (&tile.pattern_sin[..len], &tile.pattern_cos[..len]);
         let pattern_step = &tile.pattern_step[..len];
         let (sin, cos) = (&mut tile.sin[..len], &mut tile.cos[..len]);
@@ -159,9 +140,11 @@ impl Run {
             sin[i] = pattern_sin[i] * turn_cos - pattern_cos[i] * turn_sin;
             cos[i] = pattern_cos[i] * turn_cos + pattern_sin[i] * turn_sin;
         }
-        let Self { steps, lobes, .. } = *self;
+        // Steps of a whole turn.
+        let steps = self.mesh.steps(self.of) as f64;
         if !tile.position_deg.is_empty() {
             let (position_deg, from_valley_rad) = (&mut tile.position_deg[..len], &mut tile.from_valley_rad[..len]);
+            let lobes = f64::from(self.mesh.lobe_count());
             // π/U - ψ.
             let valley_step_rad = PI / lobes / steps;
             for i in 0..len {
@@ -190,10 +173,10 @@ impl Run {
 
 /// Largest size of the tiles of a sweep.
 pub(super) struct TileSize {
-    /// Number of states, with those that fill the last chunk and space for [`repeat_each`].
+    /// Number of states, with those that fill the last chunk and space for [`repeat_each`](super::lanes::repeat_each).
     len: usize,
     /// Number of input angles.
-    rows: usize,
+    pub(super) rows: usize,
     /// Number of teeth at an input angle.
     teeth: usize,
     /// True if a state has more columns than its loads.
@@ -205,30 +188,31 @@ pub(super) struct TileSize {
 }
 
 impl TileSize {
-    pub(super) fn of(mesh: &Mesh, samples: Samples, at_each_place: usize, with_columns: bool) -> Self {
+    /// Returns the size for equal intervals.
+    pub(super) fn of(kernel: &Kernel<'_>, samples: Samples, at_each_place: usize, with_columns: bool) -> Self {
+        let mesh = kernel.loaded.mesh();
         let teeth_at = |sample| at_each_place * whole(*mesh.teeth_at(sample, samples).end());
         let (least, most) = (teeth_at(0).max(1), teeth_at(samples.count() - 1));
         let states = TILE.min(at_each_place * whole(mesh.state_count(samples))).max(most);
         let rows = whole(samples.count()).min(TILE.div_ceil(least));
-        let len = states.next_multiple_of(LANES) + VECTOR;
-        Self { len, rows, teeth: most, with_columns, with_work: false, with_gaps: false }
+        Self { with_columns, ..Self::new(kernel, states, rows, most) }
     }
 
     /// Returns the size for arbitrary input angles, with at most this many teeth and loads only.
-    pub(super) fn anywhere(teeth: usize) -> Self {
+    pub(super) fn anywhere(kernel: &Kernel<'_>, teeth: usize) -> Self {
         let rows = (TILE / teeth).max(1);
-        let len = (rows * teeth).next_multiple_of(LANES) + VECTOR;
-        Self { len, rows, teeth, with_columns: false, with_work: false, with_gaps: false }
+        Self::new(kernel, rows * teeth, rows, teeth)
     }
 
-    /// Returns the size with the memory that a law needs.
-    pub(super) const fn with(self, with_work: bool, with_gaps: bool) -> Self {
-        Self { with_work, with_gaps, ..self }
-    }
-
-    /// Returns the number of input angles of a tile.
-    pub(super) const fn rows(&self) -> usize {
-        self.rows
+    const fn new(kernel: &Kernel<'_>, states: usize, rows: usize, teeth: usize) -> Self {
+        Self {
+            len: states.next_multiple_of(LANES) + VECTOR,
+            rows,
+            teeth,
+            with_columns: false,
+            with_work: kernel.sharing.is_some(),
+            with_gaps: matches!(kernel.gaps, Some(GapColumns::Unlike(_))),
+        }
     }
 
     /// Returns the total number of doubles of a tile.
@@ -245,6 +229,8 @@ impl TileSize {
 pub(super) struct Tile<'a> {
     /// Number of states. Lanes beyond the last one contain arbitrary teeth.
     pub(super) count: usize,
+    /// Number of teeth at an input angle.
+    pub(super) teeth: usize,
     /// Elapsed steps of the turn at its first input angle, and steps of the whole turn.
     pub(super) passed: f64,
     pub(super) steps: f64,
@@ -327,6 +313,7 @@ impl<'a> Tile<'a> {
         pattern_cos.fill(FRAC_1_SQRT_2);
         Self {
             count: 0,
+            teeth,
             passed: 0.0,
             steps: 0.0,
             row_sines: SineTable::equally_spaced(step_rad, rows),
@@ -364,6 +351,24 @@ impl<'a> Tile<'a> {
         }
     }
 
+    /// Returns the number of input angles.
+    #[inline(always)]
+    pub(super) const fn rows(&self) -> usize {
+        self.count / self.teeth
+    }
+
+    /// Returns the number of states, including those that fill the last chunk.
+    #[inline(always)]
+    pub(super) const fn len(&self) -> usize {
+        self.count.next_multiple_of(LANES)
+    }
+
+    /// Returns the states of an input angle.
+    #[inline(always)]
+    pub(super) const fn of_row(&self, row: usize) -> Range<usize> {
+        row * self.teeth..(row + 1) * self.teeth
+    }
+
     #[inline(always)]
     pub(super) fn lanes(&mut self, chunk: usize) -> TileLanes<'_> {
         #[inline(always)]
@@ -397,10 +402,10 @@ impl<'a> Tile<'a> {
     /// Sums the torques, of unit loads or loads, over the teeth at each input angle. Returns the number of input
     /// angles.
     #[inline(always)]
-    pub(super) fn sum_torques<const OF_UNIT_LOADS: bool>(&mut self, teeth: usize) -> usize {
-        let rows = self.count / teeth;
+    pub(super) fn sum_torques<const OF_UNIT_LOADS: bool>(&mut self) -> usize {
+        let (rows, teeth) = (self.rows(), self.teeth);
         for row in 0..rows {
-            let at = row * teeth..(row + 1) * teeth;
+            let at = self.of_row(row);
             let (cam, ring) = (&self.torque.wave_generator[at.clone()], &self.torque.ring[at.clone()]);
             let (carrier, scale) = (&self.torque.carrier[at.clone()], &self.scale[at]);
             let (mut of_cam, mut of_ring, mut of_carrier) = (0.0, 0.0, 0.0);

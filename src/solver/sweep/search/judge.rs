@@ -3,32 +3,65 @@
 use std::cell::OnceCell;
 
 use super::seen::Seen;
-use super::summit::{Bends, Nodes, Run, Summit};
+use super::summit::{Nodes, Run, Summit, margins};
 use super::{
     CAPACITY, COARSE_BEND, COARSE_CORNER, CORNERS_AT_ONCE, NODES, OFF_BY_POWERS, OFF_SMOOTH, QUANTITIES, QUARTERS,
-    SHORT, STIFFNESSES, SURE, TOWARDS_START,
+    SHORT, SMOOTH_ROUNDS, STIFFNESSES, SURE, SearchedDrive, TOWARDS_START,
 };
 
-/// Criteria for the intervals between moments.
-pub(super) struct Judge {
+/// Criteria of a round for the intervals between moments.
+pub(super) struct Judge<'a> {
+    pub(super) drive: &'a SearchedDrive,
+    /// Largest values so far.
     pub(super) best: [f64; QUANTITIES],
+    /// Relative tolerance.
     pub(super) relative: f64,
-    /// Intervals shorter than this part of a lap need no evaluation.
-    pub(super) nearest: f64,
-    pub(super) is_late: bool,
-    pub(super) is_linear: bool,
+    /// Largest error of linear interpolation between the moments, over the peaks. None if only the peaks are needed.
     pub(super) lines: Option<f64>,
-    pub(super) is_sought: [bool; QUANTITIES],
+    pub(super) round: u32,
 }
 
-impl Judge {
+/// An interval on which a quantity may exceed its largest value.
+struct Candidate {
+    /// Upper bound of the quantity.
+    bound: f64,
+    /// Fractions to evaluate next.
+    fractions: [f64; 3],
+}
+
+impl Judge<'_> {
+    /// Records the fractions to evaluate next. Returns the relative amount by which a quantity may still rise.
+    pub(super) fn want(&self, all: &mut [Seen]) -> f64 {
+        let mut most = 0.0_f64;
+        for seen in all {
+            if self.drive.has_gaps {
+                self.close_in_on_changes(seen);
+            }
+            most = most.max(self.want_of_piece(seen));
+            seen.wanted.sort_by(f64::total_cmp);
+            seen.wanted.dedup_by(|one, other| (*one - *other).abs() <= f64::EPSILON);
+        }
+        most
+    }
+
+    /// Returns the part of a lap below which intervals need no evaluation.
+    fn nearest(&self) -> f64 {
+        (1e-3 * self.relative).max(16.0 * f64::EPSILON)
+    }
+
+    /// Returns true if the smooth rounds are over: intervals are halved from then on.
+    const fn is_late(&self) -> bool {
+        self.round >= SMOOTH_ROUNDS
+    }
+
     /// Narrows the intervals in which the set of carrying teeth changes. For the first tooth that changes, it
     /// extrapolates the line through the two moments on one side.
-    pub(super) fn close_in_on_changes(&self, seen: &mut Seen, round: u32) {
+    fn close_in_on_changes(&self, seen: &mut Seen) {
+        let (nearest, is_late) = (self.nearest(), self.is_late());
         for at in 1..seen.order.len() {
             let (one, other) = (seen.order[at - 1], seen.order[at]);
             let Some(tooth) = seen.tooth_changed(one, other) else {
-                if seen.fractions[other] - seen.fractions[one] > self.nearest {
+                if seen.fractions[other] - seen.fractions[one] > nearest {
                     let suspected = seen.suspected_change(at - 1);
                     seen.wanted.extend(suspected);
                 }
@@ -51,11 +84,10 @@ impl Judge {
             let root = by_side.unwrap_or_else(|| by_line(pressed(one), pressed(other)));
             let root = Some(root).filter(|root| root.is_finite());
             // Every third round bisects, and finally every round, so that no kink prevents convergence.
-            let halves = self.is_late || round % 3 == 2 || root.is_none();
+            let halves = is_late || self.round % 3 == 2 || root.is_none();
             seen.wanted.extend(halves.then_some(0.5 * (low + high)));
-            let step = (0.25 * self.nearest).min(0.25 * (high - low));
-            seen.wanted
-                .extend(root.filter(|_| self.is_late || !halves).map(|root| root.clamp(low + step, high - step)));
+            let step = (0.25 * nearest).min(0.25 * (high - low));
+            seen.wanted.extend(root.filter(|_| is_late || !halves).map(|root| root.clamp(low + step, high - step)));
         }
     }
 
@@ -65,7 +97,7 @@ impl Judge {
         if width <= 16.0 * f64::EPSILON {
             return false;
         }
-        if width > self.nearest {
+        if width > self.nearest() {
             return true;
         }
         // The stiffness may jump there.
@@ -79,8 +111,8 @@ impl Judge {
         })
     }
 
-    /// Records the fractions of a piece to evaluate. Returns the relative amount by which a quantity may still rise.
-    pub(super) fn want(&self, seen: &mut Seen) -> f64 {
+    /// Records the fractions to evaluate next in a piece. Returns the relative amount by which a quantity may still rise.
+    fn want_of_piece(&self, seen: &mut Seen) -> f64 {
         let mut candidates: [Vec<Candidate>; QUANTITIES] = Default::default();
         let (mut wanted, mut settled) = (std::mem::take(&mut seen.wanted), Vec::new());
         let mut start = 0;
@@ -94,13 +126,11 @@ impl Judge {
             }
         }
         let mut most = 0.0_f64;
-        let at_once = if self.is_late { CORNERS_AT_ONCE } else { 1 };
+        let at_once = if self.is_late() { CORNERS_AT_ONCE } else { 1 };
         for (candidates, best) in candidates.iter_mut().zip(self.best) {
             candidates.sort_by(|one, other| other.bound.total_cmp(&one.bound));
             most = candidates.first().map_or(most, |highest| most.max(highest.bound / best - 1.0));
-            for Candidate { cuts, ends: [low, high], .. } in candidates.iter().take(at_once) {
-                wanted.extend(cuts.map(|cut| low + cut * (high - low)));
-            }
+            wanted.extend(candidates.iter().take(at_once).flat_map(|candidate| candidate.fractions));
         }
         settled.into_iter().for_each(|moment: usize| seen.is_settled[moment] = true);
         seen.wanted = wanted;
@@ -117,14 +147,15 @@ impl Judge {
     ) {
         let seen = run.seen;
         let count = run.moments.len();
-        if count < 2 || run.fraction(count - 1) - run.fraction(0) <= self.nearest {
+        let (nearest, is_linear, is_late) = (self.nearest(), self.drive.is_linear, self.is_late());
+        if count < 2 || run.fraction(count - 1) - run.fraction(0) <= nearest {
             return;
         }
         if count < NODES {
             // Too few moments for a bound.
             let cuts: &[f64] = if count < 3 { &[0.25, 0.5, 0.75] } else { &[0.5] };
             for [low, high] in (1..count).map(|at| [run.fraction(at - 1), run.fraction(at)]) {
-                if high - low > self.nearest {
+                if high - low > nearest {
                     wanted.extend(cuts.iter().map(|cut| low + cut * (high - low)));
                 }
             }
@@ -138,28 +169,27 @@ impl Judge {
         let (mut curve_bends, mut curve_bounds) = (coarse.clone(), coarse.clone());
         for at in 0..count - 1 {
             let moment = run.moments[at];
-            let ends = [run.fraction(at), run.fraction(at + 1)];
-            if seen.is_settled[moment] || ends[1] - ends[0] <= self.nearest {
+            let (low, high) = (run.fraction(at), run.fraction(at + 1));
+            if seen.is_settled[moment] || high - low <= nearest {
                 continue;
             }
-            Bends::new(run, at).margins(&coarse, &mut curve_bends, &mut curve_bounds);
+            margins(run, at, &coarse, &mut curve_bends, &mut curve_bounds);
             let nodes = OnceCell::new();
-            let may_leave_by_powers = !self.is_linear && (at < 2 || at + 3 >= count);
+            let may_leave_by_powers = !is_linear && (at < 2 || at + 3 >= count);
             let off = if may_leave_by_powers { OFF_BY_POWERS } else { OFF_SMOOTH };
             let towards_end = match (at == 0, at + 2 == count) {
-                _ if self.is_linear => None,
+                _ if is_linear => None,
                 (true, _) => Some(TOWARDS_START),
                 (_, true) => Some(TOWARDS_START.map(|cut| 1.0 - cut)),
                 _ => None,
             };
-            let is_beside_change =
-                (at == 0 && !run.is_first || at + 2 == count && !run.is_last) && ends[1] - ends[0] <= SHORT;
+            let is_beside_change = (at == 0 && !run.is_first || at + 2 == count && !run.is_last) && high - low <= SHORT;
             let (mut is_settled, mut bends_too_much) = (true, false);
-            for quantity in (0..QUANTITIES).filter(|&quantity| self.is_sought[quantity] && self.best[quantity] > 0.0) {
-                if is_beside_change && STIFFNESSES.contains(&quantity) {
+            let leaves_out_stiffness = self.drive.is_in_proportion || is_beside_change;
+            for (quantity, &best) in self.best.iter().enumerate() {
+                if best <= 0.0 || leaves_out_stiffness && STIFFNESSES.contains(&quantity) {
                     continue;
                 }
-                let best = self.best[quantity];
                 let limit = best * (1.0 + 0.25 * self.relative);
                 let curves = seen.curves(quantity);
                 bends_too_much |=
@@ -176,7 +206,7 @@ impl Judge {
                             None => (f64::INFINITY, QUARTERS),
                             Some(nodes) => match nodes.summit(seen, curve, off) {
                                 Summit { bound, .. } if bound <= limit => continue,
-                                Summit { bound, error, .. } if error > SURE * best || self.is_late => (bound, QUARTERS),
+                                Summit { bound, error, .. } if error > SURE * best || is_late => (bound, QUARTERS),
                                 Summit { bound, top, at, .. } => {
                                     let is_seen = top <= best * (1.0 + 0.125 * self.relative);
                                     (bound, [if is_seen { 0.5 } else { at.clamp(1e-3, 1.0 - 1e-3) }; 3])
@@ -185,23 +215,14 @@ impl Judge {
                         },
                     };
                     is_settled = false;
-                    candidates[quantity].push(Candidate { bound, cuts, ends });
+                    candidates[quantity].push(Candidate { bound, fractions: cuts.map(|cut| low + cut * (high - low)) });
                 }
             }
             if bends_too_much {
-                wanted.push(0.5 * (ends[0] + ends[1]));
+                wanted.push(0.5 * (low + high));
             } else if is_settled {
                 settled.push(moment);
             }
         }
     }
-}
-
-/// Upper bound of a quantity on an interval.
-#[derive(Clone, Copy)]
-struct Candidate {
-    bound: f64,
-    /// Points to evaluate, from 0 to 1 along the interval.
-    cuts: [f64; 3],
-    ends: [f64; 2],
 }

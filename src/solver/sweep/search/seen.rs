@@ -16,7 +16,7 @@ pub(crate) struct Seen {
     /// For each moment the loads, by quantity and then tooth, and then the totals.
     pub(super) values: Vec<f64>,
     /// For each moment the rotation of every tooth beyond closure; negative if a gap is open. Empty without gaps.
-    pub(super) pressed: Vec<f64>,
+    pub(crate) pressed: Vec<f64>,
     /// Indices of the moments in order of their fractions.
     pub(super) order: Vec<usize>,
     /// For each moment, true if the interval up to the next one needs no further evaluation.
@@ -54,11 +54,6 @@ impl Seen {
         let (start, stride) = (self.values.len(), self.stride());
         self.values.resize(start + stride, 0.0);
         &mut self.values[start..]
-    }
-
-    /// Appends the rotation beyond closure of the teeth of the last moment.
-    pub(crate) fn push_pressed(&mut self, pressed: impl Iterator<Item = f64>) {
-        self.pressed.extend(pressed);
     }
 
     pub(crate) fn values(&self, moment: usize) -> &[f64] {

@@ -18,55 +18,36 @@ impl Run<'_> {
     }
 }
 
-/// Second differences at both ends of an interval, from the neighbouring moments. At an end of the run both are those
-/// of the moment next to it.
-pub(super) struct Bends<'a> {
-    pub(super) ends: [&'a [f64]; 2],
-    beside: [[&'a [f64]; 3]; 2],
-    /// Weights of three moments that give the bend of this interval.
-    weights: [[f64; 3]; 2],
-}
-
-impl<'a> Bends<'a> {
-    /// Returns the bends in a run of three moments or more.
-    pub(super) fn new(run: &Run<'a>, at: usize) -> Self {
-        let last = run.moments.len() - 3;
-        let starts = [at.saturating_sub(1).min(last), at.min(last)];
-        let width = run.fraction(at + 1) - run.fraction(at);
-        let is_at_end = at == 0 || at == last + 1;
-        let weights = starts.map(|start| {
-            let [x, y, z] = [0, 1, 2].map(|step| run.fraction(start + step));
-            // By curvature for smooth curves. For two lines by the difference of slopes, of which one end shows only a
-            // part.
-            let scale = (width * width / (z - x)).max(if is_at_end { width } else { 0.5 * width });
-            let (before, after) = (scale / (y - x), scale / (z - y));
-            [before, -(before + after), after]
-        });
-        let values = |at: usize| run.seen.values(run.moments[at]);
-        Self {
-            ends: [values(at), values(at + 1)],
-            beside: starts.map(|start| [values(start), values(start + 1), values(start + 2)]),
-            weights,
-        }
-    }
-
-    /// Computes the bend of each curve, a quarter of which is the rise of a parabola, and its bound. `coarse` is by
-    /// curve.
-    pub(super) fn margins(&self, coarse: &[f64], bends: &mut [f64], bounds: &mut [f64]) {
-        let count = coarse.len();
-        let [[a, b, c], [d, e, f]] = self.weights;
-        let of = |values: &'a [f64]| &values[..count];
-        let [[x, y, z], [u, v, w]] = self.beside.map(|beside| beside.map(of));
-        let [low, high] = self.ends.map(of);
-        let (bends, bounds) = (&mut bends[..count], &mut bounds[..count]);
-        for i in 0..count {
-            let one = (a * x[i] + b * y[i] + c * z[i]).abs();
-            let other = (d * u[i] + e * v[i] + f * w[i]).abs();
-            let bend = if one > other { one } else { other };
-            let end = if low[i] > high[i] { low[i] } else { high[i] };
-            bends[i] = bend;
-            bounds[i] = end + bend * if bend > coarse[i] { COARSE_MARGIN } else { MARGIN };
-        }
+/// Computes the bend of each curve on an interval, a quarter of which is the rise of a parabola, and its bound. `coarse`
+/// is by curve. The run has three moments or more.
+///
+/// The bend is the larger of the second differences at both ends, from the neighbouring moments. At an end of the run
+/// both are those of the moment next to it.
+pub(super) fn margins(run: &Run<'_>, at: usize, coarse: &[f64], bends: &mut [f64], bounds: &mut [f64]) {
+    let count = coarse.len();
+    let last = run.moments.len() - 3;
+    let starts = [at.saturating_sub(1).min(last), at.min(last)];
+    let width = run.fraction(at + 1) - run.fraction(at);
+    let is_at_end = at == 0 || at == last + 1;
+    // Weights of three moments that give the bend of this interval.
+    let [[a, b, c], [d, e, f]] = starts.map(|start| {
+        let [x, y, z] = [0, 1, 2].map(|step| run.fraction(start + step));
+        // By curvature for smooth curves. For two lines by the difference of slopes, of which one end shows only a part.
+        let scale = (width * width / (z - x)).max(if is_at_end { width } else { 0.5 * width });
+        let (before, after) = (scale / (y - x), scale / (z - y));
+        [before, -(before + after), after]
+    });
+    let values = |at: usize| &run.seen.values(run.moments[at])[..count];
+    let [[x, y, z], [u, v, w]] = starts.map(|start| [values(start), values(start + 1), values(start + 2)]);
+    let [low, high] = [values(at), values(at + 1)];
+    let (bends, bounds) = (&mut bends[..count], &mut bounds[..count]);
+    for i in 0..count {
+        let one = (a * x[i] + b * y[i] + c * z[i]).abs();
+        let other = (d * u[i] + e * v[i] + f * w[i]).abs();
+        let bend = if one > other { one } else { other };
+        let end = if low[i] > high[i] { low[i] } else { high[i] };
+        bends[i] = bend;
+        bounds[i] = end + bend * if bend > coarse[i] { COARSE_MARGIN } else { MARGIN };
     }
 }
 

@@ -3,40 +3,166 @@
 use pulp::Simd;
 
 use super::{
-    LAST_ROTATION_STEP, Limit, MAX_ROUNDS, NOTHING, OPEN_TORQUE, Shared, Teeth, Weights, Work, forces_at_stress,
-    last_below, last_of, least_torque, start_above, turn_to_limit,
+    LAST_ROTATION_STEP, Limit, MAX_ROUNDS, NOTHING, OPEN_TORQUE, Weights, forces_at_stress, last_below, last_of,
+    least_torque, press, start_above, turn_to_limit,
 };
 use crate::contact::PerContact;
 use crate::contact_law::PALMGREN_EXPONENT;
-use crate::sweep::fast::lanes::{cube_root, inverse_tenth_root, ninth_root, repeat_each};
+use crate::sweep::fast::lanes::{cube_root, inverse_tenth_root, ninth_root};
+use crate::sweep::fast::tile::Tile;
 use crate::tooth::point::EllipticContact;
 
-/// Power law `ξ = c F^p`.
-pub(crate) struct PowerLaw<P> {
-    pub(in crate::sweep::fast) power: P,
-    pub(super) has_gaps: bool,
-}
-
-/// Operations of a power law on a column.
+/// Power law `ξ = c F^p`, in columns.
 pub(crate) trait Power {
-    /// True if p is 1.
-    const IS_LINEAR: bool;
-
     /// `p`.
-    fn exponent(&self) -> f64;
+    const EXPONENT: f64;
 
     /// `x^p`, x not negative.
     fn power<V: Simd>(&self, x: f64) -> f64;
 
-    /// `x^(1/p)`.
-    fn inverse<V: Simd>(&self, x: f64) -> f64;
-
     /// `x^(1/p - 1)`.
     fn inverse_over_x<V: Simd>(&self, x: f64) -> f64;
 
+    /// `x^(1/p)`.
+    #[inline(always)]
+    fn inverse<V: Simd>(&self, x: f64) -> f64 {
+        x * self.inverse_over_x::<V>(x)
+    }
+
     /// Computes the force at the rotation 1, `(|h'|/c)^(1/p)`, with `c = Σ w q (F_c/F_H)^p`, part of which may be
     /// given.
-    fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]);
+    fn units<V: Simd>(&self, tile: &mut Tile<'_>);
+
+    #[inline(always)]
+    fn limit<V: Simd>(&self, per_allowable: &PerContact<f64>, tile: &mut Tile<'_>) -> Option<Limit> {
+        let len = tile.len();
+        forces_at_stress(per_allowable, tile);
+        {
+            let (force, unit) = (&tile.scale[..len], &tile.work.unit[..len]);
+            let (arm, pressed) = (&tile.torque.wave_generator[..len], &mut tile.work.pressed[..len]);
+            for i in 0..len {
+                let by_law = self.power::<V>(force[i] / if arm[i] > 0.0 { unit[i] } else { 1.0 });
+                pressed[i] = if arm[i] > 0.0 { by_law } else { f64::INFINITY };
+            }
+        }
+        if !turn_to_limit(tile) {
+            return None;
+        }
+        let (pressed, unit, force) = (&tile.work.pressed[..len], &tile.work.unit[..len], &mut tile.scale[..len]);
+        for i in 0..len {
+            let by_law = self.inverse::<V>(pressed[i]);
+            force[i] = if pressed[i] > 0.0 { unit[i] * by_law } else { 0.0 };
+        }
+        least_torque(per_allowable, tile)
+    }
+
+    #[inline(always)]
+    fn share<V: Simd>(&self, torque_nmm: f64, has_gaps: bool, tile: &mut Tile<'_>) -> bool {
+        if !has_gaps {
+            self.share_in_proportion::<V>(torque_nmm, tile);
+            true
+        } else {
+            self.share_beyond_gaps::<V>(torque_nmm, tile)
+        }
+    }
+
+    /// Shares the load without gaps: the forces of all rotations are proportional.
+    #[inline(always)]
+    fn share_in_proportion<V: Simd>(&self, torque_nmm: f64, tile: &mut Tile<'_>) {
+        for row in 0..tile.rows() {
+            let at = tile.of_row(row);
+            let (arm, unit) = (&tile.torque.wave_generator[at.clone()], &tile.work.unit[at.clone()]);
+            let mut of_unit = 0.0;
+            for i in 0..tile.teeth {
+                of_unit += arm[i] * unit[i];
+            }
+            let share = torque_nmm / of_unit;
+            let rotation_rad = self.power::<V>(share);
+            tile.row_rotation_rad[row] = rotation_rad;
+            tile.row_stiffness[row] = torque_nmm / (Self::EXPONENT * rotation_rad);
+            for (force, unit) in tile.scale[at].iter_mut().zip(unit) {
+                *force = unit * share;
+            }
+        }
+    }
+
+    /// Newton's method from above, with the tangents of all forces.
+    #[inline(always)]
+    fn share_beyond_gaps<V: Simd>(&self, torque_nmm: f64, tile: &mut Tile<'_>) -> bool {
+        let (rows, count, inverse) = (tile.rows(), tile.teeth, 1.0 / Self::EXPONENT);
+        for row in 0..rows {
+            let at = tile.of_row(row);
+            let (arm, unit) = (&tile.torque.wave_generator[at.clone()], &tile.work.unit[at.clone()]);
+            let mut of_unit = 0.0;
+            for i in 0..count {
+                of_unit += arm[i] * unit[i];
+            }
+            let alone = self.power::<V>(torque_nmm / of_unit);
+            let Some((last, excess)) = start_above(alone, |i| arm[i] * unit[i], &tile.work.closing[at]) else {
+                return false;
+            };
+            (tile.work.row_last[row], tile.work.row_excess[row]) = (last, excess);
+        }
+        let mut is_last_round = false;
+        for _ in 0..MAX_ROUNDS {
+            self.tangents::<V>(tile);
+            let mut is_done = true;
+            for row in 0..rows {
+                let (at, work) = (tile.of_row(row), &mut tile.work);
+                let (slope, arm) = (&work.slope[at.clone()], &tile.torque.wave_generator[at.clone()]);
+                let pressed = &work.pressed[at.clone()];
+                let (mut torque, mut stiffness) = (0.0, 0.0);
+                for i in 0..count {
+                    let tangent = arm[i] * slope[i];
+                    stiffness += tangent;
+                    torque += if pressed[i] > 0.0 { tangent * pressed[i] } else { 0.0 };
+                }
+                let stiffness = inverse * stiffness;
+                tile.row_stiffness[row] = stiffness;
+                if is_last_round {
+                    continue;
+                }
+                let off = torque - torque_nmm;
+                let (last, step) = (work.row_last[row], off / stiffness);
+                let excess = work.row_excess[row] - step;
+                is_done &= step.abs() <= LAST_ROTATION_STEP * excess || off.abs() <= OPEN_TORQUE * torque_nmm;
+                (work.row_last[row], work.row_excess[row]) = if excess > 0.0 {
+                    (last, excess)
+                } else {
+                    is_done = false;
+                    let carrying = last_below(&work.closing[at], last, excess);
+                    (carrying, excess + (last - carrying))
+                };
+            }
+            if is_last_round {
+                for row in 0..rows {
+                    tile.row_rotation_rad[row] = tile.work.row_last[row] + tile.work.row_excess[row];
+                }
+                let len = tile.len();
+                let (pressed, slope) = (&tile.work.pressed[..len], &tile.work.slope[..len]);
+                let force = &mut tile.scale[..len];
+                for i in 0..len {
+                    force[i] = if pressed[i] > 0.0 { pressed[i] * slope[i] } else { 0.0 };
+                }
+                return tile.row_rotation_rad[..rows].iter().all(|rotation| rotation.is_finite());
+            }
+            is_last_round = is_done;
+        }
+        false
+    }
+
+    /// Computes `F/(Δφ - θ)` of the loaded teeth, which is p times the slope.
+    #[inline(always)]
+    fn tangents<V: Simd>(&self, tile: &mut Tile<'_>) {
+        press(tile);
+        let len = tile.len();
+        let (unit, pressed) = (&tile.work.unit[..len], &tile.work.pressed[..len]);
+        let slope = &mut tile.work.slope[..len];
+        for i in 0..len {
+            let over_x = self.inverse_over_x::<V>(pressed[i]);
+            slope[i] = if pressed[i] > 0.0 { unit[i] * over_x } else { 0.0 };
+        }
+    }
 }
 
 /// A linear law with gaps, or for flat-sided teeth, whose compliance is given.
@@ -46,20 +172,16 @@ pub(crate) struct Linear {
 }
 
 impl Power for Linear {
-    const IS_LINEAR: bool = true;
+    const EXPONENT: f64 = 1.0;
 
+    /// Needs no iteration.
     #[inline(always)]
-    fn exponent(&self) -> f64 {
-        1.0
+    fn share_beyond_gaps<V: Simd>(&self, torque_nmm: f64, tile: &mut Tile<'_>) -> bool {
+        share_linearly(torque_nmm, tile)
     }
 
     #[inline(always)]
     fn power<V: Simd>(&self, x: f64) -> f64 {
-        x
-    }
-
-    #[inline(always)]
-    fn inverse<V: Simd>(&self, x: f64) -> f64 {
         x
     }
 
@@ -69,10 +191,11 @@ impl Power for Linear {
     }
 
     #[inline(always)]
-    fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]) {
-        let len = teeth.len;
-        let (unit, given) = (&mut unit[..len], &given[..len]);
-        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+    fn units<V: Simd>(&self, tile: &mut Tile<'_>) {
+        let len = tile.len();
+        let (unit, given) = (&mut tile.work.unit[..len], &tile.work.given[..len]);
+        let (arm, ring) = (&tile.torque.wave_generator[..len], &tile.force.ring[..len]);
+        let carrier = &tile.force.carrier[..len];
         let Self { compliance_mm_per_n: compliance, weights } = self;
         for i in 0..len {
             let along = 1.0 - weights.ring_decline * (carrier[i] * carrier[i]);
@@ -98,21 +221,11 @@ pub(super) fn positive(x: f64) -> f64 {
 }
 
 impl Power for Palmgren {
-    const IS_LINEAR: bool = false;
-
-    #[inline(always)]
-    fn exponent(&self) -> f64 {
-        PALMGREN_EXPONENT
-    }
+    const EXPONENT: f64 = PALMGREN_EXPONENT;
 
     #[inline(always)]
     fn power<V: Simd>(&self, x: f64) -> f64 {
         x * inverse_tenth_root::<V>(positive(x))
-    }
-
-    #[inline(always)]
-    fn inverse<V: Simd>(&self, x: f64) -> f64 {
-        x * ninth_root::<V>(positive(x))
     }
 
     #[inline(always)]
@@ -122,10 +235,10 @@ impl Power for Palmgren {
 
     /// Uses `F_K/F_H` to the power 1.9 by virtual work and -0.1 by projection, and `F_S/F_H` to the power 1.9.
     #[inline(always)]
-    fn units<V: Simd>(&self, teeth: &Teeth<'_>, _: &[f64], unit: &mut [f64]) {
-        let len = teeth.len;
-        let unit = &mut unit[..len];
-        let (arm, ring, carrier) = (&teeth.arm[..len], &teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
+    fn units<V: Simd>(&self, tile: &mut Tile<'_>) {
+        let len = tile.len();
+        let (unit, arm) = (&mut tile.work.unit[..len], &tile.torque.wave_generator[..len]);
+        let (ring, carrier) = (&tile.force.ring[..len], &tile.force.carrier[..len]);
         let Self { coefficient, weights } = self;
         let of_carrier = coefficient * weights.carrier;
         for i in 0..len {
@@ -142,12 +255,7 @@ impl Power for Palmgren {
 pub(crate) struct Hertz;
 
 impl Power for Hertz {
-    const IS_LINEAR: bool = false;
-
-    #[inline(always)]
-    fn exponent(&self) -> f64 {
-        EllipticContact::EXPONENT
-    }
+    const EXPONENT: f64 = EllipticContact::EXPONENT;
 
     #[inline(always)]
     fn power<V: Simd>(&self, x: f64) -> f64 {
@@ -156,187 +264,17 @@ impl Power for Hertz {
     }
 
     #[inline(always)]
-    fn inverse<V: Simd>(&self, x: f64) -> f64 {
-        x * x.sqrt()
-    }
-
-    #[inline(always)]
     fn inverse_over_x<V: Simd>(&self, x: f64) -> f64 {
         x.sqrt()
     }
 
     #[inline(always)]
-    fn units<V: Simd>(&self, teeth: &Teeth<'_>, given: &[f64], unit: &mut [f64]) {
-        let len = teeth.len;
-        let (arm, given, unit) = (&teeth.arm[..len], &given[..len], &mut unit[..len]);
+    fn units<V: Simd>(&self, tile: &mut Tile<'_>) {
+        let (len, work) = (tile.len(), &mut tile.work);
+        let (arm, given) = (&tile.torque.wave_generator[..len], &work.given[..len]);
+        let unit = &mut work.unit[..len];
         for i in 0..len {
             unit[i] = self.inverse::<V>(arm[i] / given[i]);
-        }
-    }
-}
-
-impl<P: Power> PowerLaw<P> {
-    #[inline(always)]
-    pub(super) fn limit<V: Simd>(
-        &self,
-        per_allowable: &PerContact<f64>,
-        teeth: &Teeth<'_>,
-        work: &mut Work<'_>,
-    ) -> Option<Limit> {
-        let len = teeth.len;
-        forces_at_stress(per_allowable, teeth, work.limit);
-        {
-            let (force, unit, arm) = (&work.limit[..len], &work.unit[..len], &teeth.arm[..len]);
-            let pressed = &mut work.pressed[..len];
-            for i in 0..len {
-                let by_law = self.power.power::<V>(force[i] / if arm[i] > 0.0 { unit[i] } else { 1.0 });
-                pressed[i] = if arm[i] > 0.0 { by_law } else { f64::INFINITY };
-            }
-        }
-        if !turn_to_limit(teeth, work) {
-            return None;
-        }
-        let limit = std::mem::take(&mut work.limit);
-        let (pressed, unit, force) = (&work.pressed[..len], &work.unit[..len], &mut limit[..len]);
-        for i in 0..len {
-            let by_law = self.power.inverse::<V>(pressed[i]);
-            force[i] = if pressed[i] > 0.0 { unit[i] * by_law } else { 0.0 };
-        }
-        let least = least_torque(per_allowable, teeth, work, limit);
-        work.limit = limit;
-        least
-    }
-
-    #[inline(always)]
-    pub(super) fn share<V: Simd>(
-        &self,
-        torque_nmm: f64,
-        teeth: &Teeth<'_>,
-        work: &mut Work<'_>,
-        shared: &mut Shared<'_>,
-    ) -> bool {
-        if !self.has_gaps {
-            self.share_in_proportion::<V>(torque_nmm, teeth, work, shared);
-            true
-        } else if P::IS_LINEAR {
-            share_linearly(torque_nmm, teeth, work, shared)
-        } else {
-            self.share_beyond_gaps::<V>(torque_nmm, teeth, work, shared)
-        }
-    }
-
-    /// Shares the load without gaps: the forces of all rotations are proportional.
-    #[inline(always)]
-    fn share_in_proportion<V: Simd>(
-        &self,
-        torque_nmm: f64,
-        teeth: &Teeth<'_>,
-        work: &Work<'_>,
-        shared: &mut Shared<'_>,
-    ) {
-        for row in 0..teeth.rows {
-            let at = row * teeth.count..(row + 1) * teeth.count;
-            let (arm, unit) = (&teeth.arm[at.clone()], &work.unit[at.clone()]);
-            let mut of_unit = 0.0;
-            for i in 0..teeth.count {
-                of_unit += arm[i] * unit[i];
-            }
-            let share = torque_nmm / of_unit;
-            let rotation_rad = self.power.power::<V>(share);
-            shared.rotation_rad[row] = rotation_rad;
-            shared.stiffness[row] = torque_nmm / (self.power.exponent() * rotation_rad);
-            for (force, unit) in shared.force[at].iter_mut().zip(unit) {
-                *force = unit * share;
-            }
-        }
-    }
-
-    /// Newton's method from above, with the tangents of all forces.
-    #[inline(always)]
-    fn share_beyond_gaps<V: Simd>(
-        &self,
-        torque_nmm: f64,
-        teeth: &Teeth<'_>,
-        work: &mut Work<'_>,
-        shared: &mut Shared<'_>,
-    ) -> bool {
-        let (count, inverse) = (teeth.count, 1.0 / self.power.exponent());
-        for row in 0..teeth.rows {
-            let at = row * count..(row + 1) * count;
-            let (arm, unit) = (&teeth.arm[at.clone()], &work.unit[at.clone()]);
-            let mut of_unit = 0.0;
-            for i in 0..count {
-                of_unit += arm[i] * unit[i];
-            }
-            let alone = self.power.power::<V>(torque_nmm / of_unit);
-            let Some((last, excess)) = start_above(alone, |i| arm[i] * unit[i], &work.closing[at]) else {
-                return false;
-            };
-            (work.row_last[row], work.row_excess[row]) = (last, excess);
-        }
-        let mut is_last_round = false;
-        for _ in 0..MAX_ROUNDS {
-            self.tangents::<V>(teeth, work);
-            let mut is_done = true;
-            for row in 0..teeth.rows {
-                let at = row * count..(row + 1) * count;
-                let (slope, arm) = (&work.slope[at.clone()], &teeth.arm[at.clone()]);
-                let pressed = &work.pressed[at.clone()];
-                let (mut torque, mut stiffness) = (0.0, 0.0);
-                for i in 0..count {
-                    let tangent = arm[i] * slope[i];
-                    stiffness += tangent;
-                    torque += if pressed[i] > 0.0 { tangent * pressed[i] } else { 0.0 };
-                }
-                let stiffness = inverse * stiffness;
-                shared.stiffness[row] = stiffness;
-                if is_last_round {
-                    continue;
-                }
-                let off = torque - torque_nmm;
-                let (last, step) = (work.row_last[row], off / stiffness);
-                let excess = work.row_excess[row] - step;
-                is_done &= step.abs() <= LAST_ROTATION_STEP * excess || off.abs() <= OPEN_TORQUE * torque_nmm;
-                (work.row_last[row], work.row_excess[row]) = if excess > 0.0 {
-                    (last, excess)
-                } else {
-                    is_done = false;
-                    let carrying = last_below(&work.closing[at], last, excess);
-                    (carrying, excess + (last - carrying))
-                };
-            }
-            if is_last_round {
-                for row in 0..teeth.rows {
-                    shared.rotation_rad[row] = work.row_last[row] + work.row_excess[row];
-                }
-                let len = teeth.len;
-                let (pressed, slope) = (&work.pressed[..len], &work.slope[..len]);
-                let force = &mut shared.force[..len];
-                for i in 0..len {
-                    force[i] = if pressed[i] > 0.0 { pressed[i] * slope[i] } else { 0.0 };
-                }
-                return shared.rotation_rad[..teeth.rows].iter().all(|rotation| rotation.is_finite());
-            }
-            is_last_round = is_done;
-        }
-        false
-    }
-
-    /// Computes `F/(Δφ - θ)` of the loaded teeth, which is p times the slope.
-    #[inline(always)]
-    pub(super) fn tangents<V: Simd>(&self, teeth: &Teeth<'_>, work: &mut Work<'_>) {
-        let rows = teeth.rows;
-        repeat_each(&work.row_excess[..rows], teeth.count, work.excess);
-        repeat_each(&work.row_last[..rows], teeth.count, work.last);
-        let len = teeth.len;
-        let (unit, closing, excess, last) =
-            (&work.unit[..len], &work.closing[..len], &work.excess[..len], &work.last[..len]);
-        let (pressed, slope) = (&mut work.pressed[..len], &mut work.slope[..len]);
-        for i in 0..len {
-            let x = excess[i] + (last[i] - closing[i]);
-            pressed[i] = x;
-            let over_x = self.power.inverse_over_x::<V>(x);
-            slope[i] = if x > 0.0 { unit[i] * over_x } else { 0.0 };
         }
     }
 }
@@ -344,14 +282,15 @@ impl<P: Power> PowerLaw<P> {
 /// Newton's method that starts with all teeth carrying. With a linear law it ends when the set of carrying teeth is
 /// constant.
 #[inline(always)]
-fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
-    for row in 0..teeth.rows {
-        let at = row * teeth.count..(row + 1) * teeth.count;
-        let (arm, unit, closing) = (&teeth.arm[at.clone()], &work.unit[at.clone()], &work.closing[at.clone()]);
+fn share_linearly(torque_nmm: f64, tile: &mut Tile<'_>) -> bool {
+    for row in 0..tile.rows() {
+        let (at, work) = (tile.of_row(row), &mut tile.work);
+        let (arm, unit) = (&tile.torque.wave_generator[at.clone()], &work.unit[at.clone()]);
+        let closing = &work.closing[at.clone()];
         let mut last = last_of(closing);
         let (stiffness, excess) = loop {
             let (mut stiffness, mut before) = (0.0, 0.0);
-            for i in 0..teeth.count {
+            for i in 0..tile.teeth {
                 let of_tooth = arm[i] * unit[i];
                 stiffness += if closing[i] <= last { of_tooth } else { 0.0 };
                 before += if closing[i] <= last { of_tooth * (last - closing[i]) } else { 0.0 };
@@ -367,9 +306,9 @@ fn share_linearly(torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, share
             }
         };
         (work.row_last[row], work.row_excess[row]) = (last, excess);
-        shared.rotation_rad[row] = last + excess;
-        shared.stiffness[row] = stiffness;
-        for (force, (unit, closing)) in shared.force[at].iter_mut().zip(unit.iter().zip(closing)) {
+        tile.row_rotation_rad[row] = last + excess;
+        tile.row_stiffness[row] = stiffness;
+        for (force, (unit, closing)) in tile.scale[at].iter_mut().zip(unit.iter().zip(closing)) {
             let pressed = excess + (last - closing);
             *force = if pressed > 0.0 { unit * pressed } else { 0.0 };
         }

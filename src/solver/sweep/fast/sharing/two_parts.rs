@@ -4,31 +4,26 @@ use pulp::Simd;
 
 use super::power_law::positive;
 use super::{
-    LAST_FORCE_STEP, Limit, MAX_ROUNDS, NOTHING, Shared, Teeth, Weights, Work, forces_at_stress, last_below,
-    least_margin, least_torque, press, start_above, turn_to_limit,
+    LAST_FORCE_STEP, Limit, MAX_ROUNDS, NOTHING, Weights, forces_at_stress, last_below, least_margin, least_torque,
+    press, start_above, turn_to_limit,
 };
 use crate::contact::{Contact, PerContact};
 use crate::contact_law::{LogarithmicTerm, PALMGREN_EXPONENT};
 use crate::load_sharing::LoadedDrive;
 use crate::sweep::fast::lanes::{LANES, inverse_tenth_root, largest, ln, ln_roughly};
+use crate::sweep::fast::tile::Tile;
 
 /// Substitute for the force limit of a flat, to which the limit of Johnson's law does not apply.
 const NEVER_TOO_WIDE_N: f64 = 1e100;
 
-/// A law without a closed form for both the forces and the rotation.
-pub(crate) struct NoPowerLaw<L> {
-    pub(super) law: L,
-    pub(super) has_gaps: bool,
-}
-
-/// Operations of such a law on a column, with two coefficients for each tooth.
+/// A law without a closed form for both the forces and the rotation, in columns, with two coefficients for each tooth.
 pub(crate) trait TwoParts {
     /// `-F d²ξ/dF²` over `ξ/F - dξ/dF`.
     const BEND: f64;
 
-    /// Computes the coefficients of each tooth, with forces in units of `typical_n`, and the logarithm of the force at
-    /// which the law ends.
-    fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>);
+    /// Computes the coefficients of each tooth, with forces in units of `work.typical_n`, and the logarithm of the force
+    /// at which the law ends.
+    fn coefficients<V: Simd>(&self, tile: &mut Tile<'_>);
 
     /// Returns `dξ/dF` inside the law's range, and `ξ/F - dξ/dF`.
     fn slope_and_rest<V: Simd>(a: f64, b: f64, force: f64) -> [f64; 2];
@@ -38,6 +33,222 @@ pub(crate) trait TwoParts {
 
     /// Returns `ln F` if the law ends at some force.
     fn ln_of<V: Simd>(force: f64) -> f64;
+
+    /// Computes the coefficients of each tooth, with forces in a typical unit, so that no logarithm is large.
+    #[inline(always)]
+    fn prepare<V: Simd>(&self, torque_nmm: f64, tile: &mut Tile<'_>) {
+        tile.work.typical_n = torque_nmm / tile.torque.wave_generator[..tile.teeth].iter().sum::<f64>();
+        self.coefficients::<V>(tile);
+    }
+
+    /// Computes an initial force for each tooth, and the matching rotation.
+    #[inline(always)]
+    fn start<V: Simd>(torque: f64, tile: &mut Tile<'_>) -> bool {
+        let (len, work) = (tile.len(), &mut tile.work);
+        let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &tile.torque.wave_generator[..len]);
+        // Assumes that all forces equal the typical one.
+        let secant = &mut work.secant[..len];
+        for i in 0..len {
+            secant[i] = arm[i] / Self::over_force_roughly::<V>(a[i], b[i], 1.0);
+        }
+        for row in 0..tile.rows() {
+            let (at, work) = (tile.of_row(row), &mut tile.work);
+            let (arm, secant) = (&tile.torque.wave_generator[at.clone()], &work.secant[at.clone()]);
+            let mut stiffness = 0.0;
+            for i in 0..tile.teeth {
+                stiffness += arm[i] * secant[i];
+            }
+            let alone = torque / stiffness;
+            let Some(start) = start_above(alone, |i| arm[i] * secant[i], &work.closing[at]) else { return false };
+            (work.row_last[row], work.row_excess[row]) = start;
+        }
+        press(tile);
+        Self::guess::<V>(tile);
+        true
+    }
+
+    /// Estimates the forces from the displacements of the teeth.
+    #[inline(always)]
+    fn guess<V: Simd>(tile: &mut Tile<'_>) {
+        let (len, work) = (tile.len(), &mut tile.work);
+        let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &tile.torque.wave_generator[..len]);
+        let pressed = &work.pressed[..len];
+        let (excess, force) = (&work.excess[..len], &mut tile.scale[..len]);
+        for i in 0..len {
+            // An open tooth is treated as closed, because it may turn out to carry.
+            let pressed = if pressed[i] > 0.0 { pressed[i] } else { excess[i] };
+            let first = pressed * arm[i] / Self::over_force_roughly::<V>(a[i], b[i], 1.0);
+            let second = pressed * arm[i] / Self::over_force_roughly::<V>(a[i], b[i], positive(first));
+            force[i] = if second > NOTHING { second } else { NOTHING };
+        }
+    }
+
+    /// Forces, and the limit, are in the unit of the previous load sharing.
+    #[inline(always)]
+    fn limit<V: Simd>(&self, per_allowable: &PerContact<f64>, tile: &mut Tile<'_>) -> Option<Limit> {
+        forces_at_stress(per_allowable, tile);
+        {
+            let (len, work) = (tile.len(), &mut tile.work);
+            let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &tile.torque.wave_generator[..len]);
+            let (force, reach, pressed) = (&tile.scale[..len], &work.reach[..len], &mut work.pressed[..len]);
+            let per_typical = 1.0 / work.typical_n;
+            let least_margin = least_margin();
+            for i in 0..len {
+                let force = force[i] * per_typical;
+                let [slope, rest] = Self::slope_and_rest::<V>(a[i], b[i], force);
+                let approach = force * (slope + rest);
+                // If the law ends first on a tooth, that tooth does not limit the torque, or the end of the law is
+                // detected below.
+                let is_within = arm[i] > 0.0 && reach[i] - Self::ln_of::<V>(force) > least_margin;
+                pressed[i] = if is_within { approach / arm[i] } else { f64::INFINITY };
+            }
+        }
+        if !turn_to_limit(tile) {
+            return None;
+        }
+        Self::guess::<V>(tile);
+        let mut is_done = false;
+        for _ in 0..MAX_ROUNDS {
+            Self::tangents::<V>(tile);
+            is_done = Self::follow(tile);
+            if is_done {
+                break;
+            }
+        }
+        let is_within = Self::cut_and_check(tile);
+        least_torque(per_allowable, tile).filter(|_| is_done && is_within)
+    }
+
+    /// Newton's method for all forces and the rotations together. Each force follows the tangent of its law, and the
+    /// rotation is the one at which the tangents balance the torque. A round costs one logarithm or root for each
+    /// state.
+    #[inline(always)]
+    fn share<V: Simd>(&self, torque_nmm: f64, tile: &mut Tile<'_>) -> bool {
+        let torque = torque_nmm / tile.work.typical_n;
+        if !Self::start::<V>(torque, tile) {
+            return false;
+        }
+        for _ in 0..MAX_ROUNDS {
+            Self::tangents::<V>(tile);
+            let mut is_done = true;
+            for row in 0..tile.rows() {
+                let (at, work) = (tile.of_row(row), &mut tile.work);
+                let (slope, offset) = (&work.slope[at.clone()], &work.offset[at.clone()]);
+                let (arm, closing) = (&tile.torque.wave_generator[at.clone()], &work.closing[at]);
+                let (mut stiffness, mut of_offset) = (0.0, 0.0);
+                let last = work.row_last[row];
+                for i in 0..tile.teeth {
+                    stiffness += arm[i] * slope[i];
+                    let before = if slope[i] > 0.0 { (last - closing[i]) * slope[i] } else { 0.0 };
+                    of_offset += arm[i] * (offset[i] + before);
+                }
+                let excess = (torque - of_offset) / stiffness;
+                work.row_excess[row] = excess;
+                if excess <= 0.0 {
+                    is_done = false;
+                    let carrying = last_below(closing, last, excess);
+                    (work.row_last[row], work.row_excess[row]) = (carrying, excess + (last - carrying));
+                }
+            }
+            is_done &= Self::follow(tile);
+            if is_done {
+                return Self::finish(tile);
+            }
+        }
+        false
+    }
+
+    /// Computes the tangents of all laws at the current forces.
+    #[inline(always)]
+    fn tangents<V: Simd>(tile: &mut Tile<'_>) {
+        let (len, work) = (tile.len(), &mut tile.work);
+        let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &tile.torque.wave_generator[..len]);
+        let (reach, pressed, force) = (&work.reach[..len], &work.pressed[..len], &tile.scale[..len]);
+        let (slope, offset) = (&mut work.slope[..len], &mut work.offset[..len]);
+        let (secant, margin) = (&mut work.secant[..len], &mut work.margin[..len]);
+        for i in 0..len {
+            let [beyond, rest] = Self::slope_and_rest::<V>(a[i], b[i], force[i]);
+            let at_force = beyond + rest;
+            let both = 1.0 / (at_force * beyond);
+            let per_slope = both * at_force;
+            let is_pressed = pressed[i] > 0.0;
+            slope[i] = if is_pressed { arm[i] * per_slope } else { 0.0 };
+            offset[i] = if is_pressed { -(rest * force[i]) * per_slope } else { 0.0 };
+            secant[i] = both * beyond;
+            margin[i] = reach[i] - Self::ln_of::<V>(force[i]);
+        }
+    }
+
+    /// Updates the forces to the new rotations, and stores the former ones in place of the secants. Returns true if that
+    /// was the last step.
+    #[inline(always)]
+    fn follow(tile: &mut Tile<'_>) -> bool {
+        // A tooth that was pressed before has a slope.
+        press(tile);
+        let (len, work) = (tile.len(), &mut tile.work);
+        let (arm, pressed) = (&tile.torque.wave_generator[..len], &work.pressed[..len]);
+        let (slope, offset) = (&work.slope[..len], &work.offset[..len]);
+        let (secant, force) = (&mut work.secant[..len], &mut tile.scale[..len]);
+        let mut beyond = [0.0; LANES];
+        for start in (0..len).step_by(LANES) {
+            for (lane, beyond) in beyond.iter_mut().enumerate() {
+                let i = start + lane;
+                let before = force[i];
+                let by_tangent = offset[i] + slope[i] * pressed[i];
+                // Far from the tangent's point its root may be meaningless; there the chord of the law is used.
+                let by_chord = arm[i] * pressed[i] * secant[i];
+                let next = if by_tangent > 0.5 * by_chord { by_tangent } else { by_chord };
+                let next = if next > NOTHING { next } else { NOTHING };
+                let is_pressed = pressed[i] > 0.0;
+                let next = if is_pressed { next } else { before };
+                let has_changed = is_pressed != (slope[i] > 0.0) && arm[i] > 0.0;
+                let step = (next - before).abs() - LAST_FORCE_STEP * before - f64::EPSILON * f64::EPSILON;
+                let step = if has_changed { 1.0 } else { step };
+                force[i] = next;
+                secant[i] = before;
+                *beyond = if step > *beyond || step.is_nan() { step } else { *beyond };
+            }
+        }
+        beyond.iter().all(|&beyond| beyond <= 0.0)
+    }
+
+    /// Converts the forces to newtons, and the stiffnesses accordingly. Returns false if a contact is wider than the
+    /// law allows.
+    #[inline(always)]
+    fn finish(tile: &mut Tile<'_>) -> bool {
+        let (rows, len, work) = (tile.rows(), tile.len(), &mut tile.work);
+        let (arm, force) = (&tile.torque.wave_generator[..len], &tile.scale[..len]);
+        let (before, slope, change) = (&work.secant[..len], &work.slope[..len], &mut work.offset[..len]);
+        // Change of the slopes along the last step.
+        for i in 0..len {
+            change[i] *= (force[i] - before[i]) / (before[i] * before[i]);
+        }
+        for row in 0..rows {
+            let mut stiffness = 0.0;
+            for i in row * tile.teeth..(row + 1) * tile.teeth {
+                stiffness += arm[i] * slope[i] * (1.0 - Self::BEND * change[i]);
+            }
+            tile.row_rotation_rad[row] = work.row_last[row] + work.row_excess[row];
+            tile.row_stiffness[row] = work.typical_n * stiffness;
+        }
+        let is_finite = tile.row_rotation_rad[..rows].iter().all(|rotation| rotation.is_finite());
+        Self::cut_and_check(tile) && is_finite
+    }
+
+    /// Converts forces to newtons, zero for teeth that are not pressed. Returns true if all are within the law.
+    #[inline(always)]
+    fn cut_and_check(tile: &mut Tile<'_>) -> bool {
+        let (len, work) = (tile.len(), &mut tile.work);
+        let (arm, pressed) = (&tile.torque.wave_generator[..len], &work.pressed[..len]);
+        let (margin, force) = (&mut work.margin[..len], &mut tile.scale[..len]);
+        let (typical_n, least_margin) = (work.typical_n, least_margin());
+        for i in 0..len {
+            let carries = pressed[i] > 0.0 && arm[i] > 0.0;
+            force[i] = if carries { typical_n * force[i] } else { 0.0 };
+            margin[i] = if carries { least_margin - margin[i] } else { 0.0 };
+        }
+        largest(&margin[..tile.count]) <= 0.0
+    }
 }
 
 /// `ξ = c F^0.9 + e F`: Palmgren's law with a linear compliance.
@@ -52,10 +263,10 @@ impl TwoParts for PalmgrenAndLinear {
 
     /// `e` and `c`.
     #[inline(always)]
-    fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
-        let len = teeth.len;
-        let (ring, carrier) = (&teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
-        let given = &work.given[..len];
+    fn coefficients<V: Simd>(&self, tile: &mut Tile<'_>) {
+        let (len, work) = (tile.len(), &mut tile.work);
+        let (ring, carrier) = (&tile.force.ring[..len], &tile.force.carrier[..len]);
+        let (given, typical_n) = (&work.given[..len], work.typical_n);
         let (e, c, reach) = (&mut work.unit[..len], &mut work.growth[..len], &mut work.reach[..len]);
         let Self { coefficient, compliance, weights } = self;
         let typical = typical_n * inverse_tenth_root::<V>(typical_n);
@@ -113,7 +324,7 @@ impl Logarithm {
             match contact {
                 // σ² = F Σ E*/(π L1), F = 1 at the wave generator and F_K/F_H at the ring.
                 Contact::WaveGenerator | Contact::Ring => {
-                    of_curvature / loaded.contacts.hertz.get(contact).modulus_per_width_mpa_per_mm()
+                    of_curvature / loaded.contacts.hertz.get(contact).modulus_per_width_mpa_per_mm
                 }
                 Contact::Carrier if growth_mm_per_n > 0.0 => of_curvature / loaded.drive().parameters().tooth_radius_mm,
                 Contact::Carrier => NEVER_TOO_WIDE_N,
@@ -132,11 +343,11 @@ impl TwoParts for Logarithm {
 
     /// `A` and `B`.
     #[inline(always)]
-    fn coefficients<V: Simd>(&self, typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
-        let len = teeth.len;
-        let (ring, carrier) = (&teeth.ring_ratio[..len], &teeth.carrier_ratio[..len]);
-        let (cam_stress, ring_stress) = (&teeth.cam_stress[..len], &teeth.ring_stress[..len]);
-        let given = &work.given[..len];
+    fn coefficients<V: Simd>(&self, tile: &mut Tile<'_>) {
+        let (len, work) = (tile.len(), &mut tile.work);
+        let (ring, carrier) = (&tile.force.ring[..len], &tile.force.carrier[..len]);
+        let (cam_stress, ring_stress) = (&tile.stress.wave_generator[..len], &tile.stress.ring[..len]);
+        let (given, typical_n) = (&work.given[..len], work.typical_n);
         let (a, b, reach) = (&mut work.unit[..len], &mut work.growth[..len], &mut work.reach[..len]);
         let compliance = PerContact::of(|contact| typical_n * self.compliance.get(contact));
         let growth = PerContact::of(|contact| typical_n * self.growth.get(contact));
@@ -174,273 +385,5 @@ impl TwoParts for Logarithm {
     #[inline(always)]
     fn ln_of<V: Simd>(force: f64) -> f64 {
         ln::<V>(force)
-    }
-}
-
-impl<L: TwoParts> NoPowerLaw<L> {
-    /// Computes the coefficients of each tooth, with forces in a typical unit, so that no logarithm is large.
-    #[inline(always)]
-    pub(super) fn prepare<V: Simd>(&self, torque_nmm: f64, teeth: &Teeth<'_>, work: &mut Work<'_>) {
-        work.typical_n = torque_nmm / teeth.arm[..teeth.count].iter().sum::<f64>();
-        self.law.coefficients::<V>(work.typical_n, teeth, work);
-    }
-
-    #[inline(always)]
-    pub(super) fn share<V: Simd>(
-        &self,
-        torque_nmm: f64,
-        teeth: &Teeth<'_>,
-        work: &mut Work<'_>,
-        shared: &mut Shared<'_>,
-    ) -> bool {
-        if self.has_gaps {
-            Self::share_with::<V, true>(torque_nmm, teeth, work, shared)
-        } else {
-            Self::share_with::<V, false>(torque_nmm, teeth, work, shared)
-        }
-    }
-
-    /// Computes an initial force for each tooth, and the matching rotation.
-    #[inline(always)]
-    fn start<V: Simd, const GAPS: bool>(
-        torque: f64,
-        teeth: &Teeth<'_>,
-        work: &mut Work<'_>,
-        force: &mut [f64],
-    ) -> bool {
-        let (count, len) = (teeth.count, teeth.len);
-        let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
-        // Assumes that all forces equal the typical one.
-        let secant = &mut work.secant[..len];
-        for i in 0..len {
-            secant[i] = arm[i] / L::over_force_roughly::<V>(a[i], b[i], 1.0);
-        }
-        for row in 0..teeth.rows {
-            let at = row * count..(row + 1) * count;
-            let (arm, secant) = (&arm[at.clone()], &secant[at.clone()]);
-            let mut stiffness = 0.0;
-            for i in 0..count {
-                stiffness += arm[i] * secant[i];
-            }
-            let alone = torque / stiffness;
-            (work.row_last[row], work.row_excess[row]) = if GAPS {
-                let Some(start) = start_above(alone, |i| arm[i] * secant[i], &work.closing[at]) else { return false };
-                start
-            } else {
-                (0.0, alone)
-            };
-        }
-        press::<GAPS>(teeth, work);
-        Self::guess::<V, GAPS>(teeth, work, force);
-        true
-    }
-
-    /// Estimates the forces from the displacements of the teeth.
-    #[inline(always)]
-    fn guess<V: Simd, const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) {
-        let len = teeth.len;
-        let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
-        let pressed = &work.pressed[..len];
-        let (excess, force) = (&work.excess[..len], &mut force[..len]);
-        for i in 0..len {
-            // An open tooth is treated as closed, because it may turn out to carry.
-            let pressed = if !GAPS || pressed[i] > 0.0 { pressed[i] } else { excess[i] };
-            let first = pressed * arm[i] / L::over_force_roughly::<V>(a[i], b[i], 1.0);
-            let second = pressed * arm[i] / L::over_force_roughly::<V>(a[i], b[i], positive(first));
-            force[i] = if second > NOTHING { second } else { NOTHING };
-        }
-    }
-
-    /// Forces, and the limit, are in the unit of the previous load sharing.
-    #[inline(always)]
-    pub(super) fn limit<V: Simd>(
-        &self,
-        per_allowable: &PerContact<f64>,
-        teeth: &Teeth<'_>,
-        work: &mut Work<'_>,
-    ) -> Option<Limit> {
-        let len = teeth.len;
-        let typical_n = work.typical_n;
-        if !self.has_gaps {
-            work.closing[..len].fill(0.0);
-        }
-        // Taken temporarily: if the tile fails here, the whole sweep uses the plain path.
-        let mut limit = std::mem::take(&mut work.limit);
-        forces_at_stress(per_allowable, teeth, limit);
-        {
-            let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len]);
-            let (force, reach, pressed) = (&limit[..len], &work.reach[..len], &mut work.pressed[..len]);
-            let per_typical = 1.0 / typical_n;
-            let least_margin = least_margin();
-            for i in 0..len {
-                let force = force[i] * per_typical;
-                let [slope, rest] = L::slope_and_rest::<V>(a[i], b[i], force);
-                let approach = force * (slope + rest);
-                // If the law ends first on a tooth, that tooth does not limit the torque, or the end of the law is
-                // detected below.
-                let is_within = arm[i] > 0.0 && reach[i] - L::ln_of::<V>(force) > least_margin;
-                pressed[i] = if is_within { approach / arm[i] } else { f64::INFINITY };
-            }
-        }
-        if !turn_to_limit(teeth, work) {
-            return None;
-        }
-        Self::guess::<V, true>(teeth, work, limit);
-        let mut is_done = false;
-        for _ in 0..MAX_ROUNDS {
-            Self::tangents::<V, true>(teeth, work, limit);
-            is_done = Self::follow::<true>(teeth, work, limit);
-            if is_done {
-                break;
-            }
-        }
-        let is_within = Self::cut_and_check(typical_n, teeth, work, limit);
-        let least = least_torque(per_allowable, teeth, work, limit);
-        std::mem::swap(&mut work.limit, &mut limit);
-        least.filter(|_| is_done && is_within)
-    }
-
-    /// Newton's method for all forces and the rotations together. Each force follows the tangent of its law, and the
-    /// rotation is the one at which the tangents balance the torque. A round costs one logarithm or root for each
-    /// state.
-    #[inline(always)]
-    fn share_with<V: Simd, const GAPS: bool>(
-        torque_nmm: f64,
-        teeth: &Teeth<'_>,
-        work: &mut Work<'_>,
-        shared: &mut Shared<'_>,
-    ) -> bool {
-        let (count, typical_n) = (teeth.count, work.typical_n);
-        let torque = torque_nmm / typical_n;
-        if !Self::start::<V, GAPS>(torque, teeth, work, shared.force) {
-            return false;
-        }
-        for _ in 0..MAX_ROUNDS {
-            Self::tangents::<V, GAPS>(teeth, work, shared.force);
-            let mut is_done = true;
-            for row in 0..teeth.rows {
-                let at = row * count..(row + 1) * count;
-                let (arm, slope, offset) = (&teeth.arm[at.clone()], &work.slope[at.clone()], &work.offset[at.clone()]);
-                let (mut stiffness, mut of_offset) = (0.0, 0.0);
-                let last = work.row_last[row];
-                if GAPS {
-                    let closing = &work.closing[at.clone()];
-                    for i in 0..count {
-                        stiffness += arm[i] * slope[i];
-                        let before = if slope[i] > 0.0 { (last - closing[i]) * slope[i] } else { 0.0 };
-                        of_offset += arm[i] * (offset[i] + before);
-                    }
-                } else {
-                    for i in 0..count {
-                        stiffness += arm[i] * slope[i];
-                        of_offset += arm[i] * offset[i];
-                    }
-                }
-                let excess = (torque - of_offset) / stiffness;
-                work.row_excess[row] = excess;
-                if GAPS && excess <= 0.0 {
-                    is_done = false;
-                    let carrying = last_below(&work.closing[at], last, excess);
-                    (work.row_last[row], work.row_excess[row]) = (carrying, excess + (last - carrying));
-                }
-            }
-            is_done &= Self::follow::<GAPS>(teeth, work, shared.force);
-            if is_done {
-                return Self::finish(typical_n, teeth, work, shared);
-            }
-        }
-        false
-    }
-
-    /// Computes the tangents of all laws at the current forces.
-    #[inline(always)]
-    pub(super) fn tangents<V: Simd, const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &[f64]) {
-        let len = teeth.len;
-        let (a, b, arm, force) = (&work.unit[..len], &work.growth[..len], &teeth.arm[..len], &force[..len]);
-        let (reach, pressed) = (&work.reach[..len], &work.pressed[..len]);
-        let (slope, offset) = (&mut work.slope[..len], &mut work.offset[..len]);
-        let (secant, margin) = (&mut work.secant[..len], &mut work.margin[..len]);
-        for i in 0..len {
-            let [beyond, rest] = L::slope_and_rest::<V>(a[i], b[i], force[i]);
-            let at_force = beyond + rest;
-            let both = 1.0 / (at_force * beyond);
-            let per_slope = both * at_force;
-            let is_pressed = !GAPS || pressed[i] > 0.0;
-            slope[i] = if is_pressed { arm[i] * per_slope } else { 0.0 };
-            offset[i] = if is_pressed { -(rest * force[i]) * per_slope } else { 0.0 };
-            secant[i] = both * beyond;
-            margin[i] = reach[i] - L::ln_of::<V>(force[i]);
-        }
-    }
-
-    /// Updates the forces to the new rotations, and stores the former ones in place of the secants. Returns true if that
-    /// was the last step.
-    #[inline(always)]
-    fn follow<const GAPS: bool>(teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
-        let len = teeth.len;
-        // A tooth that was pressed before has a slope.
-        press::<GAPS>(teeth, work);
-        let (arm, pressed, slope) = (&teeth.arm[..len], &work.pressed[..len], &work.slope[..len]);
-        let (secant, offset) = (&mut work.secant[..len], &work.offset[..len]);
-        let force = &mut force[..len];
-        let mut beyond = [0.0; LANES];
-        for start in (0..len).step_by(LANES) {
-            for (lane, beyond) in beyond.iter_mut().enumerate() {
-                let i = start + lane;
-                let before = force[i];
-                let by_tangent = offset[i] + slope[i] * pressed[i];
-                // Far from the tangent's point its root may be meaningless; there the chord of the law is used.
-                let by_chord = arm[i] * pressed[i] * secant[i];
-                let next = if by_tangent > 0.5 * by_chord { by_tangent } else { by_chord };
-                let next = if next > NOTHING { next } else { NOTHING };
-                let is_pressed = !GAPS || pressed[i] > 0.0;
-                let next = if is_pressed { next } else { before };
-                let has_changed = GAPS && is_pressed != (slope[i] > 0.0) && arm[i] > 0.0;
-                let step = (next - before).abs() - LAST_FORCE_STEP * before - f64::EPSILON * f64::EPSILON;
-                let step = if has_changed { 1.0 } else { step };
-                force[i] = next;
-                secant[i] = before;
-                *beyond = if step > *beyond || step.is_nan() { step } else { *beyond };
-            }
-        }
-        beyond.iter().all(|&beyond| beyond <= 0.0)
-    }
-
-    /// Converts the forces to newtons, and the stiffnesses accordingly. Returns false if a contact is wider than the
-    /// law allows.
-    #[inline(always)]
-    fn finish(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, shared: &mut Shared<'_>) -> bool {
-        let (count, len) = (teeth.count, teeth.len);
-        let (arm, force, before) = (&teeth.arm[..len], &shared.force[..len], &work.secant[..len]);
-        let (slope, change) = (&work.slope[..len], &mut work.offset[..len]);
-        // Change of the slopes along the last step.
-        for i in 0..len {
-            change[i] *= (force[i] - before[i]) / (before[i] * before[i]);
-        }
-        for row in 0..teeth.rows {
-            let mut stiffness = 0.0;
-            for i in row * count..(row + 1) * count {
-                stiffness += arm[i] * slope[i] * (1.0 - L::BEND * change[i]);
-            }
-            shared.rotation_rad[row] = work.row_last[row] + work.row_excess[row];
-            shared.stiffness[row] = typical_n * stiffness;
-        }
-        let is_finite = shared.rotation_rad[..teeth.rows].iter().all(|rotation| rotation.is_finite());
-        Self::cut_and_check(typical_n, teeth, work, shared.force) && is_finite
-    }
-
-    /// Converts forces to newtons, zero for teeth that are not pressed. Returns true if all are within the law.
-    #[inline(always)]
-    fn cut_and_check(typical_n: f64, teeth: &Teeth<'_>, work: &mut Work<'_>, force: &mut [f64]) -> bool {
-        let len = teeth.len;
-        let (arm, pressed) = (&teeth.arm[..len], &work.pressed[..len]);
-        let (margin, force) = (&mut work.margin[..len], &mut force[..len]);
-        let least_margin = least_margin();
-        for i in 0..len {
-            let carries = pressed[i] > 0.0 && arm[i] > 0.0;
-            force[i] = if carries { typical_n * force[i] } else { 0.0 };
-            margin[i] = if carries { least_margin - margin[i] } else { 0.0 };
-        }
-        largest(&margin[..teeth.rows * teeth.count]) <= 0.0
     }
 }
