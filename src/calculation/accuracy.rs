@@ -253,7 +253,7 @@ impl<'a> Model<'a> {
         Ok(Self { checked, load, peaks: sweep.peaks, expected_error })
     }
 
-    /// Measures every number of samples and every tolerance within the limit on states.
+    /// Returns each number of samples and each tolerance within the limit on states, with its measured error and time.
     fn measured(&self, own: &Self, stop: &dyn Stop) -> Result<Vec<WayAnswer>, SolveError> {
         let &CheckedAccuracy { ref drive, ref deviations, max_states, .. } = self.checked;
         let mesh = self.load.mesh(drive, deviations);
