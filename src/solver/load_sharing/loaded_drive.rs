@@ -64,10 +64,7 @@ impl<'a> LoadedDrive<'a> {
         let p = load.parameters();
         let contacts = Contacts::new(drive, p.carrier, &p.law, &p.materials, &p.series_compliance_mm_per_n);
         let contacts = contacts.ok_or_else(|| {
-            SolveError::Impossible(vec![Violation::conflict(
-                Parameter::Law,
-                "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have",
-            )])
+            SolveError::Impossible(vec![Violation::conflict(Parameter::Law, ContactLaw::OTHER_TEETH)])
         })?;
         let mesh = load.mesh(drive, deviations.unwrap_or(&Deviations::default()));
         let tip_corner = if load.presses_corners(drive) { TipCorner::of(drive.ring_tooth())? } else { None };
