@@ -97,7 +97,7 @@ pub(crate) fn machine() -> String {
     let rustc =
         rustc.map_or_else(|| "unknown".into(), |output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
     format!(
-        "{}, family {} model {}, {cores} cores for this process, {} | {}, Linux {} | {rustc}, release profile (thin LTO), no target-cpu",
+        "{}, family {} model {}, {cores} cores for this process, {} | {}, Linux {} | {rustc}, release profile, no target-cpu",
         field(&cpu, "model name", ':'),
         field(&cpu, "cpu family", ':'),
         field(&cpu, "model", ':'),
