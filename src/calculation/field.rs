@@ -7,8 +7,6 @@ pub use toothwave_solver::violation::FieldCode;
 use toothwave_solver::violation::{Range, Violation};
 use utoipa::ToSchema;
 
-use crate::json::escaped;
-
 /// Error of a field.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FieldError {
@@ -50,6 +48,11 @@ impl FieldError {
         self.pointer.insert_str(0, &format!("/{}", escaped(key)));
         self
     }
+}
+
+/// Escapes a key for a JSON pointer (RFC 6901).
+pub fn escaped(key: &str) -> String {
+    key.replace('~', "~0").replace('/', "~1")
 }
 
 fn listed(names: &[&str]) -> String {

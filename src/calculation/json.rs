@@ -9,7 +9,7 @@ mod tree;
 
 use serde::{Deserialize, Serialize, de};
 
-use crate::field::{FieldCode, FieldError};
+use crate::field::{FieldCode, FieldError, escaped};
 use crate::no_answer::{NoAnswer, NoAnswerCode};
 
 pub use tree::{Tree, path};
@@ -70,11 +70,6 @@ pub(crate) fn or_null<'de, D: de::Deserializer<'de>>(deserializer: D) -> Result<
         Tree::Null => Ok(None),
         number => number.read().map(Some).map_err(|fault| de::Error::custom(fault.detail)),
     }
-}
-
-/// Escapes a key for a JSON pointer (RFC 6901).
-pub fn escaped(key: &str) -> String {
-    key.replace('~', "~0").replace('/', "~1")
 }
 
 fn malformed(detail: impl Into<String>) -> NoAnswer {

@@ -1,7 +1,7 @@
 //! Shared parsing of study documents: errors, names of quantities, whole numbers.
 
+pub(crate) use toothwave_calculation::field::escaped;
 use toothwave_calculation::field::{FieldCode, FieldError};
-pub(crate) use toothwave_calculation::json::escaped;
 use toothwave_calculation::no_answer::NoAnswer;
 
 use crate::quantity::Quantity;

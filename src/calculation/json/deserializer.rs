@@ -2,9 +2,8 @@
 
 use serde::de::{self, IntoDeserializer, MapAccess, Unexpected, Visitor};
 
-use super::escaped;
 use super::tree::Tree;
-use crate::field::{FieldCode, FieldError};
+use crate::field::{FieldCode, FieldError, escaped};
 
 impl Tree {
     /// Returns what stands here, for a message.
