@@ -202,7 +202,7 @@ fn other_models(drive: &Drive, own: &LoadParameters, refinements: Refinements) -
     let mut models = Vec::new();
     for compatibility in [Compatibility::Projection, Compatibility::VirtualWork] {
         for &law in &laws {
-            let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = match compatibility {
+            let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact, .. } = match compatibility {
                 Compatibility::Projection => Refinements::NONE,
                 Compatibility::VirtualWork => refinements,
             };

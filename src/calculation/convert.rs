@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 use toothwave_solver::drive::Draft;
 use toothwave_solver::{Contact, model_error};
 
-use crate::design::{DEPRECATED_SWITCHES, Design, RefinementsDocument};
+use crate::design::{DEPRECATED_SWITCHES, Design};
 use crate::field::FieldError;
 use crate::json::{self, Tree};
 use crate::no_answer::NoAnswer;
@@ -41,8 +41,8 @@ fn convert_design(tree: &mut Tree) -> Result<(), NoAnswer> {
             tree.remove(&path);
         }
         let by_default: Design = tree.read()?;
-        if by_default.refinements(has_pointed_tips) != design.refinements(has_pointed_tips) {
-            let refinements = RefinementsDocument::only(design.refinements(has_pointed_tips));
+        let refinements = design.refinements(has_pointed_tips);
+        if by_default.refinements(has_pointed_tips) != refinements {
             let text = serde_json::to_vec(&refinements).map_err(NoAnswer::internal)?;
             tree.set(&["model", "refinements"], json::tree(&text)?);
         }

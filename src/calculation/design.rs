@@ -226,7 +226,7 @@ impl Design {
 
     /// Returns the parameters of the load with the default torque.
     fn model_parameters(&self, has_pointed_tips: bool) -> LoadParameters {
-        let Refinements { ring_teeth_bend, wave_generator_moves, corner_contact } = self.refinements(has_pointed_tips);
+        let refinements = self.refinements(has_pointed_tips);
         let CarrierPartDocument { inner_radius_mm, outer_radius_mm, .. } = self.parts.carrier;
         let carrier = match self.drive.teeth {
             TeethDocument::FlatSided { .. } => CarrierRadii { inner_mm: inner_radius_mm, outer_mm: outer_radius_mm },
@@ -238,9 +238,9 @@ impl Design {
             compatibility: self.model.compatibility,
             law: (&self.stiffness()).into(),
             series_compliance_mm_per_n: self.model.series_compliance_mm_per_n.given().unwrap_or_default(),
-            ring_teeth_bend,
-            wave_generator_moves,
-            corner_contact,
+            ring_teeth_bend: refinements.ring_teeth_bend,
+            wave_generator_moves: refinements.wave_generator_moves,
+            corner_contact: refinements.corner_contact,
             modification: self.modification,
             carrier,
             clearance_um: self.clearances_um().gaps(),

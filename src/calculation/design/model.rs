@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use utoipa::openapi::schema::{ObjectBuilder, Type};
 
 use super::contact_law::StiffnessDocument;
-use super::refinements::RefinementsDocument;
+use super::refinements::Refinements;
 use crate::either;
 
 /// The model of load sharing.
@@ -25,7 +25,7 @@ pub struct ModelDocument {
     pub series_compliance_mm_per_n: SeriesComplianceDocument,
     /// Which refinements the model has, with `virtual_work` alone.
     #[serde(default)]
-    pub refinements: RefinementsDocument,
+    pub refinements: Refinements,
     /// Use `refinements`. Overrides it for `ring_teeth_bend`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(deprecated)]

@@ -1,7 +1,5 @@
 //! Refinements of the load-sharing model beyond its contact law.
 
-use std::borrow::Cow;
-
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema, Type};
@@ -9,8 +7,10 @@ use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
 /// A set of refinements. Needs `virtual_work`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Refinements {
+    /// [`RefinementItem::Auto`]. Those of a model are resolved, without it.
+    pub auto: bool,
     /// [`RefinementItem::RingTeethBend`].
     pub ring_teeth_bend: bool,
     /// [`RefinementItem::WaveGeneratorMoves`].
@@ -19,34 +19,19 @@ pub struct Refinements {
     pub corner_contact: bool,
 }
 
-impl Refinements {
-    /// The empty set.
-    pub const NONE: Self = Self { ring_teeth_bend: false, wave_generator_moves: false, corner_contact: false };
-}
-
-/// Refinements in a document.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RefinementsDocument {
-    /// True if it includes the refinements that follow from the geometry.
-    pub auto: bool,
-    /// Refinements listed in addition.
-    pub listed: Refinements,
-}
-
 const AUTO: &str = "auto";
 const NONE: &str = "none";
 
-impl RefinementsDocument {
-    /// The refinements that follow from the geometry.
-    pub const AUTO: Self = Self { auto: true, listed: Refinements::NONE };
+impl Refinements {
+    /// The empty set.
+    pub const NONE: Self =
+        Self { auto: false, ring_teeth_bend: false, wave_generator_moves: false, corner_contact: false };
 
-    /// Returns exactly these refinements.
-    pub const fn only(listed: Refinements) -> Self {
-        Self { auto: false, listed }
-    }
+    /// The refinements that follow from the geometry.
+    pub const AUTO: Self = Self { auto: true, ..Self::NONE };
 }
 
-impl Default for RefinementsDocument {
+impl Default for Refinements {
     fn default() -> Self {
         Self::AUTO
     }
@@ -71,35 +56,34 @@ impl RefinementItem {
     const ALL: [Self; 4] = [Self::Auto, Self::RingTeethBend, Self::WaveGeneratorMoves, Self::CornerContact];
 
     /// Returns the place that tells whether the refinements include the item.
-    const fn of(self, refinements: &mut RefinementsDocument) -> &mut bool {
+    const fn of(self, refinements: &mut Refinements) -> &mut bool {
         match self {
             Self::Auto => &mut refinements.auto,
-            Self::RingTeethBend => &mut refinements.listed.ring_teeth_bend,
-            Self::WaveGeneratorMoves => &mut refinements.listed.wave_generator_moves,
-            Self::CornerContact => &mut refinements.listed.corner_contact,
+            Self::RingTeethBend => &mut refinements.ring_teeth_bend,
+            Self::WaveGeneratorMoves => &mut refinements.wave_generator_moves,
+            Self::CornerContact => &mut refinements.corner_contact,
         }
     }
 }
 
-impl Serialize for RefinementsDocument {
+impl Serialize for Refinements {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match (self.listed == Refinements::NONE, self.auto) {
-            (true, true) => serializer.serialize_str(AUTO),
-            (true, false) => serializer.serialize_str(NONE),
-            (false, _) => {
-                let mut refinements = *self;
+        match *self {
+            Self::AUTO => serializer.serialize_str(AUTO),
+            Self::NONE => serializer.serialize_str(NONE),
+            mut refinements => {
                 serializer.collect_seq(RefinementItem::ALL.into_iter().filter(|item| *item.of(&mut refinements)))
             }
         }
     }
 }
 
-impl<'de> Deserialize<'de> for RefinementsDocument {
+impl<'de> Deserialize<'de> for Refinements {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct WordOrList;
 
         impl<'de> Visitor<'de> for WordOrList {
-            type Value = RefinementsDocument;
+            type Value = Refinements;
 
             fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
                 write!(f, "`{AUTO}`, `{NONE}` or a list of refinements")
@@ -107,14 +91,14 @@ impl<'de> Deserialize<'de> for RefinementsDocument {
 
             fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Self::Value, E> {
                 match word {
-                    AUTO => Ok(RefinementsDocument::AUTO),
-                    NONE => Ok(RefinementsDocument::only(Refinements::NONE)),
+                    AUTO => Ok(Refinements::AUTO),
+                    NONE => Ok(Refinements::NONE),
                     other => Err(E::unknown_variant(other, &[AUTO, NONE])),
                 }
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Self::Value, A::Error> {
-                let mut refinements = RefinementsDocument::only(Refinements::NONE);
+                let mut refinements = Refinements::NONE;
                 while let Some(item) = items.next_element::<RefinementItem>()? {
                     *item.of(&mut refinements) = true;
                 }
@@ -126,7 +110,7 @@ impl<'de> Deserialize<'de> for RefinementsDocument {
     }
 }
 
-impl PartialSchema for RefinementsDocument {
+impl PartialSchema for Refinements {
     fn schema() -> RefOr<Schema> {
         let word = ObjectBuilder::new().schema_type(Type::String).enum_values(Some([AUTO, NONE]));
         let list = ArrayBuilder::new().items(Ref::from_schema_name(RefinementItem::name()));
@@ -143,11 +127,7 @@ impl PartialSchema for RefinementsDocument {
     }
 }
 
-impl ToSchema for RefinementsDocument {
-    fn name() -> Cow<'static, str> {
-        Cow::Borrowed("Refinements")
-    }
-
+impl ToSchema for Refinements {
     fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
         schemas.push((RefinementItem::name().into(), RefinementItem::schema()));
     }

@@ -6,8 +6,7 @@ use toothwave_solver::violation::Modified;
 use toothwave_solver::{Compatibility, Modification, Parameter, Part, PerContact, Violation, model_error};
 
 use super::{
-    ClearanceDocument, Design, ModelDocument, Refinements, RefinementsDocument, StiffnessDocument, StrengthDocument,
-    TeethDocument,
+    ClearanceDocument, Design, ModelDocument, Refinements, StiffnessDocument, StrengthDocument, TeethDocument,
 };
 use crate::field::FieldError;
 
@@ -114,7 +113,7 @@ impl Design {
     /// Checks that deprecated switches do not conflict with `refinements` or `projection`.
     pub fn require_one_choice_of_refinements(&self) -> Result<(), FieldError> {
         let is_projection = self.model.compatibility == Compatibility::Projection;
-        let is_chosen = self.model.refinements != RefinementsDocument::AUTO;
+        let is_chosen = self.model.refinements != Refinements::AUTO;
         for (pointer, is_on) in self.model.switches() {
             let detail = match is_on {
                 Some(_) if is_chosen => {
@@ -147,11 +146,8 @@ impl Design {
     /// against elastic bodies.
     fn refinements_by_geometry(&self, has_pointed_tips: bool) -> Refinements {
         let is_refined = has_pointed_tips && matches!(self.drive.teeth, TeethDocument::Cylinder { .. });
-        Refinements {
-            ring_teeth_bend: is_refined,
-            wave_generator_moves: is_refined && self.has_gaps(),
-            corner_contact: false,
-        }
+        let wave_generator_moves = is_refined && self.has_gaps();
+        Refinements { ring_teeth_bend: is_refined, wave_generator_moves, ..Refinements::NONE }
     }
 
     /// Returns the refinements of the model, for a drive with or without pointed or bored tips. A list with `projection`
@@ -160,19 +156,19 @@ impl Design {
         self.refinements_of(self.model.refinements, has_pointed_tips)
     }
 
-    fn refinements_of(&self, asked: RefinementsDocument, has_pointed_tips: bool) -> Refinements {
+    fn refinements_of(&self, asked: Refinements, has_pointed_tips: bool) -> Refinements {
         let by_geometry = match self.model.compatibility {
             Compatibility::VirtualWork if asked.auto => self.refinements_by_geometry(has_pointed_tips),
             _ => Refinements::NONE,
         };
-        let listed = asked.listed;
         let ModelDocument { ring_teeth_bend, wave_generator_moves, corner_contact, .. } = self.model;
-        let moves = by_geometry.wave_generator_moves || listed.wave_generator_moves;
+        let moves = by_geometry.wave_generator_moves || asked.wave_generator_moves;
         Refinements {
-            ring_teeth_bend: ring_teeth_bend.unwrap_or(by_geometry.ring_teeth_bend || listed.ring_teeth_bend),
+            auto: false,
+            ring_teeth_bend: ring_teeth_bend.unwrap_or(by_geometry.ring_teeth_bend || asked.ring_teeth_bend),
             // If bending is off, the geometry never chose any refinement.
             wave_generator_moves: wave_generator_moves.unwrap_or(moves && ring_teeth_bend != Some(false)),
-            corner_contact: corner_contact.unwrap_or(by_geometry.corner_contact || listed.corner_contact),
+            corner_contact: corner_contact.unwrap_or(by_geometry.corner_contact || asked.corner_contact),
         }
     }
 
@@ -204,7 +200,7 @@ impl Design {
             compatibility: self.model.compatibility,
             stiffness: Some(self.stiffness()),
             series_compliance_mm_per_n: self.model.series_compliance_mm_per_n.clone(),
-            refinements: RefinementsDocument::only(self.refinements(has_pointed_tips)),
+            refinements: self.refinements(has_pointed_tips),
             clearance: self.effective_clearance(),
             ..ModelDocument::default()
         }
@@ -227,13 +223,12 @@ impl Design {
         // Deprecated switches are kept, because answers name them.
         let has_switch = self.model.switches().any(|(_, is_on)| is_on.is_some());
         // Only refinements other than `auto` depend on the geometry.
-        if is_only_drive && !has_switch && self.model.refinements != RefinementsDocument::AUTO {
+        if is_only_drive && !has_switch && self.model.refinements != Refinements::AUTO {
             let drive = Draft::new(&self.drive_parameters()).ok().and_then(|draft| draft.drive());
             let has_pointed_tips = drive.is_some_and(|drive| model_error::has_pointed_tips(&drive));
             let refinements = self.refinements(has_pointed_tips);
-            let is_auto = refinements == self.refinements_of(RefinementsDocument::AUTO, has_pointed_tips);
-            self.model.refinements =
-                if is_auto { RefinementsDocument::AUTO } else { RefinementsDocument::only(refinements) };
+            let is_auto = refinements == self.refinements_of(Refinements::AUTO, has_pointed_tips);
+            self.model.refinements = if is_auto { Refinements::AUTO } else { refinements };
         }
         self
     }
