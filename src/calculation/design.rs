@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 use toothwave_solver::backing::Support;
 use toothwave_solver::fingers::{FingerParameters, LoadCycle, Strength};
-use toothwave_solver::losses::duty::LossParameters;
+use toothwave_solver::losses::duty::{Duty, DutyPoint, LossParameters};
 use toothwave_solver::parts::{CarrierRadii, PartsParameters};
 use toothwave_solver::profile::ProfileParameters;
 use toothwave_solver::sweep::Points;
@@ -95,28 +95,6 @@ pub struct Design {
     /// Position of the parts in a drawing of the assembly.
     #[serde(default)]
     pub assembly: AssemblyDocument,
-}
-
-/// Load spectrum.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Duty {
-    /// Points of the duty.
-    pub points: Vec<DutyPoint>,
-    /// Index of the point with the largest torque, which has the largest forces, stresses and wind-up.
-    pub hardest: usize,
-    /// True if the document has a duty, false for a single load.
-    pub is_asked: bool,
-}
-
-/// Point of a duty.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DutyPoint {
-    /// Torque.
-    pub torque: Torque,
-    /// Speed of the wave generator.
-    pub input_speed_rpm: Option<f64>,
-    /// Share of the running time.
-    pub share_of_time: f64,
 }
 
 /// Returns the torque if exactly one is given.
@@ -216,7 +194,7 @@ impl Design {
             let detail = "forces need a load: give `load` an `input_torque_nm` or an `output_torque_nm`";
             FieldError::at("/load", FieldCode::MissingField, detail)
         })?;
-        let Duty { points, hardest, .. } = self.duty()?;
+        let Duty { points, hardest } = self.duty()?;
         Ok(LoadParameters {
             torque: points[hardest].torque,
             allowable_stress_mpa: load.allowable_stress_mpa.map(|stress_mpa| stress_mpa.0),
@@ -261,7 +239,7 @@ impl Design {
         let Some(duty) = &load.duty else {
             let torque = one_torque(input_torque_nm, output_torque_nm, "/load")?;
             let point = DutyPoint { torque, input_speed_rpm, share_of_time: 1.0 };
-            return Ok(Duty { points: vec![point], ..Duty::default() });
+            return Ok(Duty { points: vec![point], hardest: 0 });
         };
         if input_torque_nm.or(output_torque_nm).or(input_speed_rpm).is_some() {
             let detail = "`duty` has torques and speeds of its own: no other may stand here";
@@ -289,14 +267,19 @@ impl Design {
         };
         let hardest = (1..points.len())
             .fold(0, |hardest, at| if input_nm(&points[at]) > input_nm(&points[hardest]) { at } else { hardest });
-        Ok(Duty { points, hardest, is_asked: true })
+        Ok(Duty { points, hardest })
+    }
+
+    /// Returns true if the document has a duty, not a single load.
+    pub fn has_duty(&self) -> bool {
+        self.load.as_ref().is_some_and(|load| load.duty.is_some())
     }
 
     /// Returns every value of the duty that is out of its range, or else shares that do not add up to one. Without a
     /// duty it checks the speed of the load.
     pub fn duty_violations(&self) -> Result<Vec<Violation>, FieldError> {
-        let Duty { points, is_asked, .. } = self.duty()?;
-        if !is_asked {
+        let Duty { points, .. } = self.duty()?;
+        if !self.has_duty() {
             let speeds = points.iter().filter_map(|point| point.input_speed_rpm);
             return Ok(speeds.filter_map(|speed_rpm| Parameter::InputSpeed.check(speed_rpm)).collect());
         }

@@ -103,11 +103,10 @@ pub(crate) fn checked_load(
         let backings = Backings::of(&drive, draft, &design.parts_parameters()?, design.support());
         parameters.series_compliance_mm_per_n = backings.series_compliance_mm_per_n(&drive, &parameters);
     }
-    let duty = design.duty()?;
     // The torques of a duty have their own fields.
     let of_duty = |violation: &Violation| {
         use Parameter::{InputTorque, OutputTorque};
-        duty.is_asked && matches!(violation.parameter, InputTorque | OutputTorque)
+        design.has_duty() && matches!(violation.parameter, InputTorque | OutputTorque)
     };
     let of_clearances = design.clearance_violations();
     // A gap is the sum of clearances, so the error is about one clearance or about their sum.

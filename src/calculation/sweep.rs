@@ -14,15 +14,13 @@ use serde::Serialize;
 use toothwave_solver::backing::Backings;
 use toothwave_solver::backlash::{self, Backlash};
 use toothwave_solver::fingers::CarrierFingers;
-use toothwave_solver::losses::duty::{Duty, DutyLosses, DutyPoint, DutySweep, LossParameters, LossTotals, PointLosses};
+use toothwave_solver::losses::duty::{Costs, Duty, DutyPoint, DutySweep, LossParameters, LossTotals};
 use toothwave_solver::losses::{Mechanism, period};
 use toothwave_solver::ring::FlankEnd;
 use toothwave_solver::sweep::{self as solver, Points};
-use toothwave_solver::{
-    Contact, Deviations, Drive, LoadCase, LoadParameters, PerContact, SolveError, Stop, findings, model_error,
-};
+use toothwave_solver::{Contact, Deviations, Drive, LoadCase, PerContact, SolveError, Stop, findings, model_error};
 
-use crate::design::{self, Design, ModelDocument};
+use crate::design::{Design, ModelDocument};
 use crate::field::FieldCode;
 use crate::findings::{Causes, FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};
@@ -38,6 +36,8 @@ pub use states::Column;
 #[derive(Debug)]
 pub struct CheckedSweep {
     drive: Drive,
+    /// For a duty, that of the hardest point.
+    load: LoadCase,
     model: ModelDocument,
     of_document: Vec<FindingAnswer>,
     duty: Duty,
@@ -86,8 +86,8 @@ impl CheckedSweep {
     }
 
     /// Returns the load; for a duty, that of the hardest point.
-    pub fn load(&self) -> &LoadCase {
-        self.duty.hardest()
+    pub const fn load(&self) -> &LoadCase {
+        &self.load
     }
 
     /// Returns the same sweep without wear and bearing life.
@@ -103,24 +103,22 @@ impl CheckedSweep {
         estimates.into_iter().filter(|estimate| estimate.contact == Contact::Carrier).find_map(|finger| finger.share)
     }
 
-    /// Returns the loss totals over all points of a duty, given the sweep of the hardest; none without friction.
+    /// Returns the loss totals over all points of a duty but for the life of a bearing, given the sweep of the hardest;
+    /// none without friction.
     pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotals>, SolveError> {
-        let forces = match self.losses {
-            Some(LossParameters { bearing: Some(_), .. }) => self.radial_forces(hardest, stop)?,
-            _ => None,
-        };
-        Ok(self.losses(hardest, forces.as_ref(), stop)?.map(|losses| self.losses_along(losses.totals)))
+        let costs = self.costs(hardest, None, stop)?;
+        Ok(costs.map(|(costs, _)| self.losses_along(costs.totals(self.duty.hardest, &hardest.states))))
     }
 
-    /// Returns the losses, given the sweep of the hardest point; none without friction.
-    fn losses(
+    /// Returns the losses of all points and those of the hardest, given its sweep; none without friction.
+    fn costs(
         &self,
         hardest: &solver::Sweep,
         forces: Option<&period::RadialForces>,
         stop: &dyn Stop,
-    ) -> Result<Option<DutyLosses>, SolveError> {
-        let Self { drive, deviations, points, duty, .. } = self;
-        let of_duty = DutySweep { drive, deviations, points: *points, duty };
+    ) -> Result<Option<(Costs<'_>, period::Losses)>, SolveError> {
+        let Self { drive, load, deviations, points, duty, .. } = self;
+        let of_duty = DutySweep { drive, load, deviations, points: *points, duty };
         self.losses.as_ref().map(|parameters| of_duty.losses(parameters, hardest, forces, stop)).transpose()
     }
 
@@ -166,17 +164,6 @@ impl CheckedSweep {
         let run = |load: &LoadCase| solver::peaks(&self.drive, load, self.points, stop);
         self.limited(run, |peaks| &mut peaks.torque_capacity)
     }
-}
-
-/// Returns the loads of a document. The hardest is already checked; the others differ from it only in torque.
-fn checked_duty(duty: &design::Duty, hardest: &LoadCase) -> Result<Duty, NoAnswer> {
-    let point = |&design::DutyPoint { torque, input_speed_rpm, share_of_time }: &design::DutyPoint| {
-        let load = LoadCase::new(&LoadParameters { torque, ..*hardest.parameters() })?;
-        Ok(DutyPoint { load, input_speed_rpm, share_of_time })
-    };
-    let points = duty.points.iter().map(point).collect::<Result<_, _>>();
-    let points = points.map_err(|violations: Vec<_>| NoAnswer::impossible(&violations))?;
-    Ok(Duty { points, hardest: duty.hardest })
 }
 
 /// Question: forces and contact stresses over one period.
@@ -234,8 +221,9 @@ impl Question for Sweep {
             fingers: fingers.transpose().map_err(SolveError::from)?,
             backings,
             drive,
-            duty: checked_duty(&duty, &load)?,
-            is_duty: duty.is_asked,
+            load,
+            duty,
+            is_duty: design.has_duty(),
             deviations,
             losses,
             points,
@@ -290,12 +278,12 @@ impl Question for Sweep {
         let model_error = model_error::of(drive, load, deviations, &sweep, parts)?;
         go_on()?;
         let forces = checked.radial_forces(&sweep, stop)?;
-        let losses = checked.losses(&sweep, forces.as_ref(), stop)?;
-        let duty_answer = checked.is_duty.then(|| DutyAnswer::new(drive, duty, losses.as_ref()));
-        let losses = match losses {
-            Some(DutyLosses { totals, hardest, findings, .. }) => {
-                found.extend(findings);
-                let totals = checked.losses_along(totals);
+        let costs = checked.costs(&sweep, forces.as_ref(), stop)?;
+        let duty_answer = checked.is_duty.then(|| DutyAnswer::new(drive, duty, costs.as_ref().map(|(costs, _)| costs)));
+        let losses = match costs {
+            Some((costs, hardest)) => {
+                found.extend(costs.findings());
+                let totals = checked.losses_along(costs.totals(duty.hardest, &sweep.states));
                 Some(LossesAnswer::new(&Mechanism::of(drive), totals, hardest, &sweep)?)
             }
             None => None,
@@ -375,19 +363,17 @@ impl Question for Sweep {
 }
 
 impl DutyAnswer {
-    fn new(drive: &Drive, duty: &Duty, losses: Option<&DutyLosses>) -> Self {
-        let of_point = |(at, &DutyPoint { load, input_speed_rpm, share_of_time }): (usize, &DutyPoint)| {
-            let losses = losses.map(|losses| losses.points[at]);
-            DutyPointAnswer {
-                input_torque_nm: load.input_torque_nm(drive),
-                output_torque_nm: load.output_torque_nm(drive),
+    fn new(drive: &Drive, duty: &Duty, costs: Option<&Costs<'_>>) -> Self {
+        let of_point =
+            |(at, &DutyPoint { torque, input_speed_rpm, share_of_time }): (usize, &DutyPoint)| DutyPointAnswer {
+                input_torque_nm: torque.input_nm(drive),
+                output_torque_nm: torque.output_nm(drive),
                 // Every point of a duty has a speed.
                 input_speed_rpm: input_speed_rpm.unwrap_or_default(),
                 share_of_time,
-                efficiency_ring_fixed: losses.map(|PointLosses { efficiency_ring_fixed, .. }| efficiency_ring_fixed),
-                power_loss_w: losses.and_then(|losses| losses.power_loss_w),
-            }
-        };
+                efficiency_ring_fixed: costs.map(|costs| costs.efficiency_at(at)),
+                power_loss_w: costs.and_then(|costs| costs.power_loss_at_w(at)),
+            };
         Self {
             hardest_point: duty.hardest,
             mean_input_speed_rpm: duty.mean_input_speed_rpm(),

@@ -20,6 +20,25 @@ pub enum Torque {
     Output(f64),
 }
 
+impl Torque {
+    /// Returns the torque at the wave generator: without losses, the carrier torque over the absolute ratio, ring
+    /// fixed.
+    pub fn input_nm(self, drive: &Drive) -> f64 {
+        match self {
+            Self::Input(torque) => torque,
+            Self::Output(torque) => torque / drive.teeth_per_wave(),
+        }
+    }
+
+    /// Returns the torque at the carrier, without losses.
+    pub fn output_nm(self, drive: &Drive) -> f64 {
+        match self {
+            Self::Input(torque) => torque * drive.teeth_per_wave(),
+            Self::Output(torque) => torque,
+        }
+    }
+}
+
 impl Default for Torque {
     fn default() -> Self {
         Self::Input(20.0)
@@ -187,21 +206,14 @@ impl LoadCase {
         &self.0
     }
 
-    /// Returns the torque at the wave generator: without losses, the carrier torque over the absolute ratio, ring
-    /// fixed.
+    /// Returns the torque at the wave generator.
     pub fn input_torque_nm(&self, drive: &Drive) -> f64 {
-        match self.0.torque {
-            Torque::Input(torque) => torque,
-            Torque::Output(torque) => torque / drive.teeth_per_wave(),
-        }
+        self.0.torque.input_nm(drive)
     }
 
     /// Returns the torque at the carrier, without losses.
     pub fn output_torque_nm(&self, drive: &Drive) -> f64 {
-        match self.0.torque {
-            Torque::Input(torque) => torque * drive.teeth_per_wave(),
-            Torque::Output(torque) => torque,
-        }
+        self.0.torque.output_nm(drive)
     }
 
     /// Returns true if teeth of this drive press against the corners of the ring's tips: no balls, and a flank with a

@@ -7,7 +7,7 @@ use crate::contact::PerContact;
 use crate::drive::Drive;
 use crate::findings::{self, Finding};
 use crate::gaps::Deviations;
-use crate::load_sharing::LoadCase;
+use crate::load_sharing::{LoadCase, LoadParameters, Torque};
 use crate::losses::bearing::{BearingLife, BearingRating};
 use crate::losses::period::{BearingLoad, LossByPlace, Losses, RadialForces, Wear};
 use crate::losses::wear::{WearParameters, WornPlace};
@@ -29,8 +29,8 @@ pub struct LossParameters {
 /// One load of a duty, or the only load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DutyPoint {
-    /// The load.
-    pub load: LoadCase,
+    /// The torque.
+    pub torque: Torque,
     /// Speed of the wave generator, ring fixed; each point of a duty has one.
     pub input_speed_rpm: Option<f64>,
     /// Share of the running time, or any quantity proportional to it.
@@ -38,20 +38,15 @@ pub struct DutyPoint {
 }
 
 /// Loads of a duty cycle, at least one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Duty {
     /// All loads.
     pub points: Vec<DutyPoint>,
-    /// The load with the largest torque.
+    /// Index of the load with the largest torque, which has the largest forces, stresses and wind-up.
     pub hardest: usize,
 }
 
 impl Duty {
-    /// Returns the load with the largest torque.
-    pub fn hardest(&self) -> &LoadCase {
-        &self.points[self.hardest].load
-    }
-
     /// Returns the mean speed of the wave generator: revolutions divided by running time.
     pub fn mean_input_speed_rpm(&self) -> f64 {
         let time: f64 = self.points.iter().map(|point| point.share_of_time).sum();
@@ -105,46 +100,24 @@ pub struct LossTotals {
     pub bearing: Option<BearingLife>,
 }
 
-/// Friction losses of a drive under its duty.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct DutyLosses {
-    /// Totals over all points.
-    pub totals: LossTotals,
-    /// Losses of each point, in order.
-    pub points: Vec<PointLosses>,
-    /// Losses of the hardest point for each state and input angle.
-    pub hardest: Losses,
-    /// Findings about the losses.
-    pub findings: Vec<Finding>,
-}
-
-/// Friction losses at one point of a duty.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct PointLosses {
-    /// Efficiency with the ring fixed.
-    pub efficiency_ring_fixed: f64,
-    /// Power lost while this point runs, ring fixed, given a speed.
-    pub power_loss_w: Option<f64>,
-}
-
 /// Drive with its duty and sweep points.
 #[derive(Debug, Clone, Copy)]
 pub struct DutySweep<'a> {
     /// The drive.
     pub drive: &'a Drive,
+    /// Load with the largest torque of the duty. The other loads differ from it in the torque alone.
+    pub load: &'a LoadCase,
     /// Deviations of its single items.
     pub deviations: &'a Deviations,
     /// Input angles of its sweeps.
     pub points: Points,
-    /// Loads of the duty.
+    /// The duty.
     pub duty: &'a Duty,
 }
 
 impl DutySweep<'_> {
-    /// Returns the losses. Takes the sweep of the hardest point and, if bearings are required, its transverse forces on
-    /// the wave generator.
+    /// Returns the losses of all points, and those of the hardest for each state and input angle. Takes the sweep of the
+    /// hardest point and, if bearings are required, its transverse forces on the wave generator.
     ///
     /// ```
     /// use toothwave_solver::losses::duty::{Duty, DutyPoint, DutySweep, LossParameters};
@@ -155,9 +128,8 @@ impl DutySweep<'_> {
     /// let drive = Drive::new(&DriveParameters::default()).unwrap();
     /// let load = LoadCase::new(&LoadParameters::default()).unwrap();
     ///
-    /// let light = LoadCase::new(&LoadParameters { torque: Torque::Input(5.0), ..LoadParameters::default() }).unwrap();
-    /// let point = |load, share_of_time| DutyPoint { load, input_speed_rpm: Some(1500.0), share_of_time };
-    /// let duty = Duty { points: vec![point(load, 0.1), point(light, 0.9)], hardest: 0 };
+    /// let point = |torque, share_of_time| DutyPoint { torque, input_speed_rpm: Some(1500.0), share_of_time };
+    /// let duty = Duty { points: vec![point(load.parameters().torque, 0.1), point(Torque::Input(5.0), 0.9)], hardest: 0 };
     /// let friction = Friction::new(&FrictionParameters {
     ///     wave_generator: WaveGeneratorFriction::Plain { coefficient: 0.01 },
     ///     ring_coefficient: 0.05,
@@ -167,50 +139,47 @@ impl DutySweep<'_> {
     /// let parameters = LossParameters { friction, wear_rate_mm3_per_nm: None, bearing: None };
     /// let points = Points::samples(50).unwrap();
     /// let hardest = sweep(&drive, &load, points, &Never).unwrap();
-    /// let of_duty = DutySweep { drive: &drive, deviations: &Deviations::default(), points, duty: &duty };
-    /// let totals = of_duty.losses(&parameters, &hardest, None, &Never).unwrap().totals;
-    /// assert!(totals.power_loss_w.is_some());
+    /// let of_duty = DutySweep { drive: &drive, load: &load, deviations: &Deviations::default(), points, duty: &duty };
+    /// let (costs, _) = of_duty.losses(&parameters, &hardest, None, &Never).unwrap();
+    /// assert!(costs.totals(0, &hardest.states).power_loss_w.is_some());
     /// ```
     ///
     /// # Errors
-    /// The errors of [`sweep_with_deviations`].
-    pub fn losses(
+    /// The errors of [`sweep_with_deviations`]; [`SolveError::Impossible`] for a torque out of its range.
+    pub fn losses<'p>(
         &self,
-        parameters: &LossParameters,
+        parameters: &'p LossParameters,
         hardest: &Sweep,
         forces: Option<&RadialForces>,
         stop: &dyn Stop,
-    ) -> Result<DutyLosses, SolveError> {
-        let Self { drive, deviations, duty, .. } = *self;
-        let mut losses = self.losses_of(parameters, &duty.points[duty.hardest], hardest, stop)?;
+    ) -> Result<(Costs<'p>, Losses), SolveError> {
+        let Self { drive, load, deviations, duty, .. } = *self;
+        let mut losses = self.losses_of(parameters, load, &duty.points[duty.hardest], hardest, stop)?;
         let cost = |(at, point): (usize, &DutyPoint)| {
             if at == duty.hardest {
-                return Ok(self.cost(parameters, point, hardest, forces, &mut losses));
+                return Ok(self.cost(parameters, load, point, hardest, forces, &mut losses));
             }
-            let sweep = sweep_with_deviations(drive, &point.load, deviations, self.points, stop)?;
-            let forces = RadialForces::of(drive, &point.load, deviations, &sweep, stop)?;
-            let mut losses = self.losses_of(parameters, point, &sweep, stop)?;
-            Ok(self.cost(parameters, point, &sweep, forces.as_ref(), &mut losses))
+            let parameters_of_load = LoadParameters { torque: point.torque, ..*load.parameters() };
+            let load = LoadCase::new(&parameters_of_load).map_err(SolveError::Impossible)?;
+            let sweep = sweep_with_deviations(drive, &load, deviations, self.points, stop)?;
+            let forces = RadialForces::of(drive, &load, deviations, &sweep, stop)?;
+            let mut losses = self.losses_of(parameters, &load, point, &sweep, stop)?;
+            Ok(self.cost(parameters, &load, point, &sweep, forces.as_ref(), &mut losses))
         };
         let points = duty.points.iter().enumerate().map(cost).collect::<Result<_, SolveError>>()?;
-        let costs = Costs { mechanism: Mechanism::of(drive), parameters, points };
-        Ok(DutyLosses {
-            totals: costs.totals(duty.hardest, &hardest.states),
-            points: costs.points.iter().map(|point| costs.of_point(point)).collect(),
-            hardest: losses,
-            findings: costs.findings(),
-        })
+        Ok((Costs { mechanism: Mechanism::of(drive), parameters, points }, losses))
     }
 
     /// Returns the losses of a sweep. The means of a sweep to a tolerance keep it.
     fn losses_of(
         &self,
         LossParameters { friction, wear_rate_mm3_per_nm, .. }: &LossParameters,
-        DutyPoint { load, input_speed_rpm, .. }: &DutyPoint,
+        load: &LoadCase,
+        point: &DutyPoint,
         sweep: &Sweep,
         stop: &dyn Stop,
     ) -> Result<Losses, SolveError> {
-        let wear = wear_rate_mm3_per_nm.zip(*input_speed_rpm).map(|(rate_mm3_per_nm, speed_rpm)| {
+        let wear = wear_rate_mm3_per_nm.zip(point.input_speed_rpm).map(|(rate_mm3_per_nm, speed_rpm)| {
             let turning_rad_per_s = Mechanism::of(self.drive).turning_rad_per_s(speed_rpm);
             WearParameters { rate_mm3_per_nm, turning_rad_per_s }
         });
@@ -227,7 +196,8 @@ impl DutySweep<'_> {
     fn cost(
         &self,
         parameters: &LossParameters,
-        DutyPoint { load, input_speed_rpm, share_of_time }: &DutyPoint,
+        load: &LoadCase,
+        &DutyPoint { input_speed_rpm, share_of_time, .. }: &DutyPoint,
         sweep: &Sweep,
         forces: Option<&RadialForces>,
         losses: &mut Losses,
@@ -236,8 +206,8 @@ impl DutySweep<'_> {
         let turning_rad_per_s = input_speed_rpm.map(|speed_rpm| mechanism.turning_rad_per_s(speed_rpm));
         Cost {
             input_torque_nm: load.input_torque_nm(self.drive),
-            input_speed_rpm: *input_speed_rpm,
-            share_of_time: *share_of_time,
+            input_speed_rpm,
+            share_of_time,
             mean: losses.mean,
             pressure_velocity: turning_rad_per_s.map(|turning| losses.pressure_velocity_peaks(sweep, turning)),
             wear: losses.wear.take(),
@@ -353,13 +323,12 @@ impl Costs<'_> {
         let efficiency = mechanism.efficiency(Fixed::Ring, loss_ratio);
         let FirstOrderError { efficiency: efficiency_error, is_within_measured_range, .. } =
             parameters.friction.first_order_error(mechanism, mechanism.loss_share(Fixed::Ring, loss_ratio));
-        let hardest = &points[hardest];
         LossTotals {
             efficiency: Efficiencies { ring_fixed: efficiency.driven, ring_fixed_back_driven: efficiency.back_driven },
             self_locking: efficiency.is_self_locking(),
             efficiency_error,
             is_within_measured_range,
-            required_input_torque_nm: hardest.input_torque_nm / self.of_point(hardest).efficiency_ring_fixed,
+            required_input_torque_nm: points[hardest].input_torque_nm / self.efficiency_at(hardest),
             loss_ratio,
             loss_ratio_by_place: LossByPlace::of(|place| self.loss_ratio(place)),
             power_loss_w: self.power_w(LossByPlace::total),
@@ -372,16 +341,18 @@ impl Costs<'_> {
         }
     }
 
-    fn of_point(&self, point: &Cost) -> PointLosses {
-        let ratio = point.mean.total();
-        PointLosses {
-            efficiency_ring_fixed: self.mechanism.efficiency(Fixed::Ring, ratio).driven,
-            power_loss_w: self.power_at_w(point, ratio),
-        }
+    /// Returns the efficiency at a point with the ring fixed.
+    pub fn efficiency_at(&self, at: usize) -> f64 {
+        self.mechanism.efficiency(Fixed::Ring, self.points[at].mean.total()).driven
+    }
+
+    /// Returns the power lost while a point runs, ring fixed; none without a speed.
+    pub fn power_loss_at_w(&self, at: usize) -> Option<f64> {
+        self.power_at_w(&self.points[at], self.points[at].mean.total())
     }
 
     /// Returns the findings about friction, and about the bearing at its largest load.
-    fn findings(&self) -> Vec<Finding> {
+    pub fn findings(&self) -> Vec<Finding> {
         let loss_ratio = self.loss_ratio(LossByPlace::total);
         let of_friction = findings::of_friction(&self.mechanism, &self.parameters.friction, loss_ratio);
         let most_n = self.points.iter().filter_map(|point| Some(point.bearing?.mean_load_n)).reduce(f64::max);
