@@ -88,31 +88,22 @@ pub enum Fixed {
     WaveGenerator,
 }
 
-/// Efficiency with one member fixed, for a given torque at the driven end.
+/// Output power divided by input power with one member fixed, for a given torque at the driven end. Answers have it with
+/// the ring fixed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Efficiency {
-    /// Output power divided by input power.
-    pub driven: f64,
-    /// Efficiency when the drive is back-driven. At or below 0 the drive is self-locking. A negative value is the extra
-    /// power required from the other end, relative to the load's power.
-    pub back_driven: f64,
-}
-
-/// Efficiencies with the ring fixed, the torque at the driven end given.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+#[cfg_attr(
+    feature = "document",
+    derive(serde::Serialize, utoipa::ToSchema),
+    schema(description = "Efficiencies with the ring fixed, the torque at the driven end given.")
+)]
 pub struct Efficiencies<T> {
-    /// The wave generator drives the carrier.
-    pub ring_fixed: T,
-    /// The carrier drives the wave generator; at or below 0 the drive is self-locking.
-    pub ring_fixed_back_driven: T,
-}
-
-impl Efficiency {
-    /// True if no torque at the output turns the drive.
-    pub fn is_self_locking(&self) -> bool {
-        self.back_driven <= 0.0
-    }
+    /// If the drive is driven as [`Fixed`] says.
+    #[cfg_attr(feature = "document", serde(rename = "ring_fixed"))]
+    pub driven: T,
+    /// If the drive is back-driven. At or below 0 it is self-locking. A negative value is the extra power required from
+    /// the other end, relative to the load's power.
+    #[cfg_attr(feature = "document", serde(rename = "ring_fixed_back_driven"))]
+    pub back_driven: T,
 }
 
 impl Mechanism {
@@ -175,9 +166,9 @@ impl Mechanism {
     }
 
     /// Returns the efficiencies `1/(1 + ℓ)` and `1 - ℓ` at a loss ratio ν. Over a period, use the mean ν.
-    pub fn efficiency(&self, fixed: Fixed, loss_ratio: f64) -> Efficiency {
+    pub fn efficiency(&self, fixed: Fixed, loss_ratio: f64) -> Efficiencies<f64> {
         let loss_share = self.loss_share(fixed, loss_ratio);
-        Efficiency { driven: 1.0 / (1.0 + loss_share), back_driven: 1.0 - loss_share }
+        Efficiencies { driven: 1.0 / (1.0 + loss_share), back_driven: 1.0 - loss_share }
     }
 
     /// Returns `|ω_HS|`, the speed of the wave generator relative to the carrier with the ring fixed: `|ω_H| Z_K/Z_G`.

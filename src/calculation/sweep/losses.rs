@@ -62,7 +62,7 @@ impl LossesAnswer {
         sweep: &Sweep,
     ) -> Result<Self, NoAnswer> {
         let at_each = losses.loss_ratio.iter().map(|&ratio| mechanism.efficiency(Fixed::Ring, ratio));
-        let (ring_fixed, ring_fixed_back_driven) = at_each.map(|of| (of.driven, of.back_driven)).unzip();
+        let (driven, back_driven) = at_each.map(|of| (of.driven, of.back_driven)).unzip();
         let answer = Self {
             totals,
             slip_mm_per_rad: losses.slip_mm_per_rad,
@@ -70,7 +70,7 @@ impl LossesAnswer {
             by_input_angle: LossesByInputAngleAnswer {
                 input_angle_deg: sweep.input_angles.input_angle_deg.clone(),
                 loss_ratio: losses.loss_ratio,
-                efficiency: Efficiencies { ring_fixed, ring_fixed_back_driven },
+                efficiency: Efficiencies { driven, back_driven },
             },
         };
         // The sweep checks the columns of slips with its own.
@@ -82,8 +82,7 @@ impl LossesAnswer {
 /// Returns the numbers whose finiteness implies that of all others.
 fn numbers(totals: &LossTotals) -> Vec<f64> {
     let LossTotals { loss_ratio, efficiency_error, required_input_torque_nm, efficiency, .. } = totals;
-    let mut numbers =
-        vec![*loss_ratio, *efficiency_error, *required_input_torque_nm, efficiency.ring_fixed_back_driven];
+    let mut numbers = vec![*loss_ratio, *efficiency_error, *required_input_torque_nm, efficiency.back_driven];
     numbers.extend(totals.power_loss_w);
     let products = totals.pressure_velocity_mpa_m_per_s.iter().flat_map(PerContact::iter);
     numbers.extend(products.map(|(_, peak)| peak.value));

@@ -116,9 +116,9 @@ fn write_backlash(backlash: &Backlash, writer: &mut dyn Write) -> io::Result<()>
 }
 
 fn write_losses(totals: &LossTotals, writer: &mut dyn Write) -> io::Result<()> {
-    let Efficiencies { ring_fixed, ring_fixed_back_driven } = totals.efficiency;
+    let Efficiencies { driven, back_driven } = totals.efficiency;
     let locks = if totals.self_locking { " (locks itself)" } else { "" };
-    let (driven, back_driven) = (100.0 * ring_fixed, 100.0 * ring_fixed_back_driven);
+    let (driven, back_driven) = (100.0 * driven, 100.0 * back_driven);
     writeln!(writer, "\nefficiency             driven   from behind")?;
     writeln!(writer, "ring fixed           {driven:>6.2} %      {back_driven:>6.2} %{locks}")?;
     let torque_nm = totals.required_input_torque_nm;

@@ -324,8 +324,8 @@ impl Costs<'_> {
         let FirstOrderError { efficiency: efficiency_error, is_within_measured_range, .. } =
             parameters.friction.first_order_error(mechanism, mechanism.loss_share(Fixed::Ring, loss_ratio));
         LossTotals {
-            efficiency: Efficiencies { ring_fixed: efficiency.driven, ring_fixed_back_driven: efficiency.back_driven },
-            self_locking: efficiency.is_self_locking(),
+            efficiency,
+            self_locking: efficiency.back_driven <= 0.0,
             efficiency_error,
             is_within_measured_range,
             required_input_torque_nm: points[hardest].input_torque_nm / self.efficiency_at(hardest),

@@ -426,13 +426,13 @@ pub static QUANTITIES: [Quantity; 61] = [
         "efficiency_ring_fixed",
         "Efficiency if the wave generator drives the carrier.",
         sweep("/losses/efficiency/ring_fixed"),
-        |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed)),
+        |variant| Ok(variant.losses(|losses| losses.efficiency.driven)),
     ),
     efficiency(
         "efficiency_ring_fixed_back_driven",
         "Efficiency if the carrier drives the wave generator. At or below 0 the drive is self-locking.",
         sweep("/losses/efficiency/ring_fixed_back_driven"),
-        |variant| Ok(variant.losses(|losses| losses.efficiency.ring_fixed_back_driven)),
+        |variant| Ok(variant.losses(|losses| losses.efficiency.back_driven)),
     ),
     of_losses(
         "efficiency_error",
