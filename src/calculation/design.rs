@@ -277,22 +277,21 @@ impl Design {
 
     /// Returns every value of the duty that is out of its range, or else shares that do not add up to one. Without a
     /// duty it checks the speed of the load.
-    pub fn duty_violations(&self) -> Result<Vec<Violation>, FieldError> {
-        let Duty { points, .. } = self.duty()?;
-        if !self.has_duty() {
-            let speeds = points.iter().filter_map(|point| point.input_speed_rpm);
-            return Ok(speeds.filter_map(|speed_rpm| Parameter::InputSpeed.check(speed_rpm)).collect());
-        }
+    pub fn duty_violations(&self) -> Vec<Violation> {
+        let Some(load) = &self.load else { return Vec::new() };
+        let Some(points) = &load.duty else {
+            let speed = load.input_speed_rpm;
+            return speed.and_then(|speed_rpm| Parameter::InputSpeed.check(speed_rpm)).into_iter().collect();
+        };
         let mut violations: Vec<_> = Parameter::DutyPoints.check(points.len() as f64).into_iter().collect();
         for (at, point) in points.iter().enumerate() {
-            let torque = match point.torque {
-                Torque::Input(torque_nm) => (OfDutyPoint::InputTorque, Some(torque_nm)),
-                Torque::Output(torque_nm) => (OfDutyPoint::OutputTorque, Some(torque_nm)),
-            };
-            let speed = (OfDutyPoint::InputSpeed, point.input_speed_rpm);
-            let share = (OfDutyPoint::ShareOfTime, Some(point.share_of_time));
-            let out_of_range = |(of, value): (OfDutyPoint, Option<f64>)| Parameter::Duty(of, at).check(value?);
-            violations.extend([torque, speed, share].into_iter().filter_map(out_of_range));
+            let values = [
+                (OfDutyPoint::InputTorque, point.input_torque_nm),
+                (OfDutyPoint::OutputTorque, point.output_torque_nm),
+                (OfDutyPoint::InputSpeed, Some(point.input_speed_rpm)),
+                (OfDutyPoint::ShareOfTime, Some(point.share_of_time)),
+            ];
+            violations.extend(values.into_iter().filter_map(|(of, value)| Parameter::Duty(of, at).check(value?)));
         }
         let sum: f64 = points.iter().map(|point| point.share_of_time).sum();
         if violations.is_empty() && (sum - 1.0).abs() > SHARES_TOLERANCE {
@@ -301,7 +300,7 @@ impl Design {
             );
             violations.push(Violation::new(FieldCode::OutOfRange, Parameter::DutyPoints, sum, 1.0, detail));
         }
-        Ok(violations)
+        violations
     }
 
     /// Returns the conflict of two fields that set the same quantity, whether or not an answer needs it.

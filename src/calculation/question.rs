@@ -121,7 +121,7 @@ pub(crate) fn checked_load(
         .map_err(|found| violations.extend(found.into_iter().filter(|found| !of_duty(found)).filter_map(as_clearance)))
         .ok();
     violations.extend(of_clearances);
-    violations.extend(design.duty_violations()?);
+    violations.extend(design.duty_violations());
     violations.extend(parameters.clearance_violations(draft)?);
     violations.extend(draft.drive().and_then(|drive| parameters.modification.violation_in(&drive)));
     violations.extend(parameters.carrier_violations(draft));
