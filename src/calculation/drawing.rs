@@ -4,11 +4,12 @@ use std::borrow::Cow;
 
 use serde::Serialize;
 use toothwave_solver::Stop;
-use toothwave_solver::drawing as solver;
+pub use toothwave_solver::drawing::DrawnPart;
+use toothwave_solver::drawing::{self as solver, Body, DrawingParameters, Edge, Outline};
 use toothwave_solver::drive::{Draft, DriveError};
+use utoipa::ToSchema;
 
 use crate::design::Design;
-use crate::drawing::answer::{BodyAnswer, DrawingAnswer, DrawnPart, EdgeAnswer, OutlineAnswer};
 use crate::drawing::preset::Preset;
 use crate::findings::{Causes, FindingAnswer, drive_findings};
 use crate::forms::{Form, Format, Forms};
@@ -17,7 +18,6 @@ use crate::key::Key;
 use crate::no_answer::NoAnswer;
 use crate::question::{Limits, Question};
 
-pub mod answer;
 mod dxf;
 mod mesh;
 pub mod preset;
@@ -40,11 +40,31 @@ pub struct Drawing {
 pub struct CheckedDrawing {
     drawing: solver::Drawing,
     design_hash: String,
-    subject: DrawnPart,
-    chord_tolerance_mm: f64,
-    input_angle_deg: Option<f64>,
     of_document: Vec<FindingAnswer>,
     causes: Causes,
+}
+
+/// Drawing: prisms of the teeth's width, or balls, each given by its section and its placements.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct DrawingAnswer {
+    /// Version of the solver.
+    pub solver_version: &'static str,
+    /// Build that computed the drawing. Equal builds on equal processors give equal bytes.
+    pub build: &'static str,
+    /// Hash of the solver's version, the drive, the parts and the chord tolerance. It is equal for all drawings that
+    /// belong together.
+    pub design_hash: String,
+    /// Subject of the drawing.
+    pub subject: DrawnPart,
+    /// Largest distance of a chord from its curve.
+    pub chord_tolerance_mm: f64,
+    /// Angle of the wave generator, for an assembly only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub input_angle_deg: Option<f64>,
+    /// Drawn parts.
+    pub bodies: Vec<Body>,
+    /// Findings about the drive and about the drawn parts as manufactured.
+    pub findings: Vec<FindingAnswer>,
 }
 
 /// A point's coordinates.
@@ -75,16 +95,16 @@ impl Question for Drawing {
             Preset::Document => Cow::Borrowed(design),
             Preset::Printing => Cow::Owned(preset::printed(design)),
         };
-        let (subject, design) = (self.part, &*drawn);
+        let design = &*drawn;
         let of_design = design.drawn_in_key();
-        let parameters = solver::DrawingParameters {
+        let parameters = DrawingParameters {
             chord_tolerance_mm: design.profile.chord_tolerance_mm,
             max_points: limits.max_profile_points,
             input_angle_deg: design.assembly.input_angle_deg,
         };
         let draft = Draft::new(&design.drive_parameters())?;
         let parts = design.parts_parameters()?;
-        let drawing = solver::Drawing::new(&draft, subject.subject(), &parts, &parameters);
+        let drawing = solver::Drawing::new(&draft, self.part, &parts, &parameters);
         let drawing = drawing.map_err(|error| match error {
             DriveError::Impossible(violations) => NoAnswer::impossible(&design.as_written(&violations)),
             DriveError::NotConverged(error) => error.into(),
@@ -92,15 +112,12 @@ impl Question for Drawing {
         Ok(CheckedDrawing {
             drawing,
             design_hash: Key::new("design", &of_design, &(Format::Json, false)).to_string(),
-            subject,
             of_document: FindingAnswer::of_document(design, false),
             causes: Causes {
                 ring_clearance: parts.ring_clearance_um > 0.0,
                 ring_equidistant: parts.modification.ring_equidistant_um > 0.0,
                 ..Causes::default()
             },
-            chord_tolerance_mm: parameters.chord_tolerance_mm,
-            input_angle_deg: (subject == DrawnPart::Assembly).then_some(parameters.input_angle_deg),
         })
     }
 
@@ -118,6 +135,8 @@ impl Question for Drawing {
         let bodies = checked.drawing.bodies(stop)?;
         let of_parts = checked.drawing.findings()?;
         let drive = checked.drawing.drive();
+        let subject = checked.drawing.subject();
+        let &DrawingParameters { chord_tolerance_mm, input_angle_deg, .. } = checked.drawing.parameters();
         let mut findings = drive_findings(drive)?;
         findings.extend(of_parts.iter().map(|finding| FindingAnswer::new(finding, drive, checked.causes)));
         findings.extend(checked.of_document.iter().cloned());
@@ -125,10 +144,10 @@ impl Question for Drawing {
             solver_version: toothwave_solver::VERSION,
             build: crate::BUILD,
             design_hash: checked.design_hash.clone(),
-            subject: checked.subject,
-            chord_tolerance_mm: checked.chord_tolerance_mm,
-            input_angle_deg: checked.input_angle_deg,
-            bodies: bodies.into_iter().map(|body| BodyAnswer::new(body, checked.drawing.drive())).collect(),
+            subject,
+            chord_tolerance_mm,
+            input_angle_deg: (subject == DrawnPart::Assembly).then_some(input_angle_deg),
+            bodies,
             findings,
         })
     }
@@ -139,14 +158,14 @@ impl DrawingAnswer {
     fn points_and_poles(&self) -> (usize, usize) {
         let outlines = self.bodies.iter().flat_map(|body| body.holes.iter().chain([&body.outer]));
         let edges = outlines.flat_map(|outline| match outline {
-            OutlineAnswer::Circle { .. } => &[][..],
-            OutlineAnswer::Path { edges } => edges,
+            Outline::Circle { .. } => &[][..],
+            Outline::Path { edges } => edges,
         });
         edges.fold((0, 0), |(points, poles), edge| match edge {
-            EdgeAnswer::Curve { x_mm, polynomials, .. } => {
+            Edge::Curve { x_mm, polynomials, .. } => {
                 (points + x_mm.len(), poles + polynomials.iter().map(Vec::len).sum::<usize>())
             }
-            EdgeAnswer::Line { .. } | EdgeAnswer::Arc { .. } => (points, poles),
+            Edge::Line { .. } | Edge::Arc { .. } => (points, poles),
         })
     }
 }

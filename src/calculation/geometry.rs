@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use toothwave_solver::drawing::{self, Edge};
+use toothwave_solver::drawing;
 use toothwave_solver::losses::{Fixed, Mechanism};
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::profile::{self, Polyline, ProfileParameters};
@@ -251,8 +251,8 @@ impl Question for Geometry {
         let center_distance_mm = drive.least_center_distance_mm()?;
         let tip_radius_mm = drive.tip_radius_mm();
         let finger = drawing::widest_finger(drive).map(|edges| {
-            let corners: Vec<_> = edges.iter().map(Edge::start).collect();
-            FingerAnswer { corners: (&corners).into() }
+            let [x_mm, y_mm] = [0, 1].map(|axis| edges.iter().map(|edge| edge.start()[axis]).collect());
+            FingerAnswer { corners: ProfileAnswer { x_mm, y_mm } }
         });
         let answer = GeometryAnswer {
             solver_version: toothwave_solver::VERSION,

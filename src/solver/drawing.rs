@@ -9,11 +9,11 @@ use crate::arcs;
 pub use crate::arcs::ArcStart;
 use crate::cam::Cam;
 use crate::contact::Part;
-use crate::drive::{Draft, Drive, DriveError};
+use crate::drive::{Draft, Drive, DriveError, ToothShape};
 use crate::findings::{self, Finding};
 use crate::gaps::RAD_PER_ARCSEC;
+use crate::outline::{Curve, POINTS_PER_CHORD, chords, ends_of_chords};
 pub use crate::outline::{Edge, Outline, SPLINE_SHARE_OF_CHORD};
-use crate::outline::{POINTS_PER_CHORD, chords, ends_of_chords};
 use crate::parts::{CarrierPart, MadePart, PartsParameters};
 use crate::profile::{
     Density, Extent, ProfileParameters, SampledCurve, cam_half_lobe, cam_half_lobes, direction, expected_points,
@@ -22,39 +22,65 @@ use crate::profile::{
 use crate::root::NotConverged;
 use crate::spline;
 use crate::tooth_space::{HalfSpace, ToothSpace};
-use crate::violation::{Parameter, Violation};
+use crate::violation::Parameter;
 use crate::{SolveError, Stop};
 
 /// Subject of a drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Subject {
-    /// One part in its own frame.
-    Part(Part),
-    /// All parts in the ring's frame, at an input angle.
+#[cfg_attr(feature = "document", derive(serde::Serialize, serde::Deserialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(rename_all = "kebab-case"))]
+pub enum DrawnPart {
+    /// The ring, x along the middle of a tooth space.
+    Ring,
+    /// The wave generator, x along the middle of a lobe, the major axis of an ellipse.
+    WaveGenerator,
+    /// The carrier, x along a slot.
+    Carrier,
+    /// A tooth.
+    Tooth,
+    /// All parts in the ring's frame, at the document's input angle.
     Assembly,
 }
 
 /// Placement of a section: rotated about its origin, then moved.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), schema(as = PlacementAnswer))]
 pub struct Placement {
-    /// Position of its origin.
-    pub origin_mm: Point2<f64>,
+    /// x of the origin.
+    pub x_mm: f64,
+    /// y of the origin.
+    pub y_mm: f64,
     /// Rotation, counter-clockwise.
-    pub rotation_rad: f64,
+    pub rotation_deg: f64,
 }
 
 /// Part as prisms of one section. Teeth and the fingers between the carrier's slots have several placements.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), schema(as = BodyAnswer))]
 #[non_exhaustive]
 pub struct Body {
-    /// The part.
+    /// Name of the part.
     pub part: Part,
+    /// Shape of the solid on its section.
+    pub solid: BodySolid,
+    /// Height of the prism. For a ball, that of the parts around it, with the ball in the middle.
+    pub width_mm: f64,
     /// Outer boundary of the section.
     pub outer: Outline,
-    /// Holes of the section.
+    /// Holes in the section.
     pub holes: Vec<Outline>,
     /// Placement of each prism.
     pub placements: Vec<Placement>,
+}
+
+/// Shape of the solid on a section.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema), serde(rename_all = "snake_case"))]
+pub enum BodySolid {
+    /// A prism, from the plane of the section upward.
+    Prism,
+    /// A ball of the section's radius. Its centre is half the width above the section.
+    Ball,
 }
 
 /// Parameters of a drawing.
@@ -74,24 +100,28 @@ impl Default for DrawingParameters {
     }
 }
 
-impl Subject {
+impl DrawnPart {
+    /// All subjects.
+    pub const ALL: [Self; 5] = [Self::Ring, Self::WaveGenerator, Self::Carrier, Self::Tooth, Self::Assembly];
+
     /// Returns the drawn parts, from the outside in.
-    pub const fn parts(&self) -> &[Part] {
+    pub const fn parts(self) -> &'static [Part] {
         match self {
-            Self::Part(part) => std::slice::from_ref(part),
+            Self::Ring => &[Part::Ring],
+            Self::WaveGenerator => &[Part::WaveGenerator],
+            Self::Carrier => &[Part::Carrier],
+            Self::Tooth => &[Part::Teeth],
             Self::Assembly => &[Part::Ring, Part::Carrier, Part::Teeth, Part::WaveGenerator],
         }
     }
 }
 
-impl DrawingParameters {
-    /// Returns the values outside their ranges.
-    fn violations(&self, subject: Subject) -> Vec<Violation> {
-        let input_angle = match subject {
-            Subject::Part(_) => None,
-            Subject::Assembly => Parameter::InputAngle.check(self.input_angle_deg),
-        };
-        Parameter::ChordTolerance.check(self.chord_tolerance_mm).into_iter().chain(input_angle).collect()
+impl Placement {
+    /// Moves a point of the section to its place.
+    pub fn placing(&self) -> impl Fn([f64; 2]) -> [f64; 2] + use<> {
+        let Self { x_mm, y_mm, rotation_deg } = *self;
+        let (sin, cos) = rotation_deg.to_radians().sin_cos();
+        move |[x, y]| [x_mm + (x * cos - y * sin), y_mm + (x * sin + y * cos)]
     }
 }
 
@@ -101,7 +131,7 @@ pub struct Drawing {
     drive: Drive,
     parts: Vec<MadePart>,
     carrier_rotation_rad: f64,
-    subject: Subject,
+    subject: DrawnPart,
     parameters: DrawingParameters,
 }
 
@@ -109,14 +139,14 @@ impl Drawing {
     /// Checks the parameters of the subject.
     ///
     /// ```
-    /// use toothwave_solver::drawing::{Drawing, DrawingParameters, Subject};
+    /// use toothwave_solver::drawing::{Drawing, DrawingParameters, DrawnPart};
     /// use toothwave_solver::drive::Draft;
     /// use toothwave_solver::parts::PartsParameters;
     /// use toothwave_solver::{DriveParameters, Never};
     ///
     /// let draft = Draft::new(&DriveParameters::default()).unwrap();
     /// let parameters = DrawingParameters { chord_tolerance_mm: 0.01, ..DrawingParameters::default() };
-    /// let drawing = Drawing::new(&draft, Subject::Assembly, &PartsParameters::default(), &parameters).unwrap();
+    /// let drawing = Drawing::new(&draft, DrawnPart::Assembly, &PartsParameters::default(), &parameters).unwrap();
     /// let bodies = drawing.bodies(&Never).unwrap();
     /// assert!(bodies.len() >= 4);
     /// ```
@@ -125,12 +155,15 @@ impl Drawing {
     /// Every reason why it cannot be made, including those of the drive.
     pub fn new(
         draft: &Draft,
-        subject: Subject,
+        subject: DrawnPart,
         parts: &PartsParameters,
         parameters: &DrawingParameters,
     ) -> Result<Self, DriveError> {
         let mut violations = draft.violations().to_vec();
-        violations.extend(parameters.violations(subject));
+        violations.extend(Parameter::ChordTolerance.check(parameters.chord_tolerance_mm));
+        if subject == DrawnPart::Assembly {
+            violations.extend(Parameter::InputAngle.check(parameters.input_angle_deg));
+        }
         violations.extend(subject.parts().iter().flat_map(|&part| parts.violations(part, draft)));
         let Some(drive) = draft.drive().filter(|_| violations.is_empty()) else {
             return Err(DriveError::Impossible(violations));
@@ -144,6 +177,16 @@ impl Drawing {
     /// Returns the drive.
     pub const fn drive(&self) -> &Drive {
         &self.drive
+    }
+
+    /// Returns the subject.
+    pub const fn subject(&self) -> DrawnPart {
+        self.subject
+    }
+
+    /// Returns the parameters.
+    pub const fn parameters(&self) -> &DrawingParameters {
+        &self.parameters
     }
 
     /// Returns the findings about the drawn parts as manufactured.
@@ -181,22 +224,33 @@ impl Drawing {
     fn body(&self, part: &MadePart, stop: &dyn Stop) -> Result<Body, SolveError> {
         let (part, outer, holes) = match part {
             MadePart::Ring { space, outer_radius_mm } => {
-                let holes = vec![Outline::Edges(self.ring_edges(space, stop)?)];
-                (Part::Ring, Outline::circle(*outer_radius_mm), holes)
+                let hole = Outline::Path { edges: self.ring_edges(space, stop)? };
+                (Part::Ring, Outline::Circle { radius_mm: *outer_radius_mm }, vec![hole])
             }
             MadePart::WaveGenerator { set_back_mm, bore_radius_mm } => {
-                let outer = match self.cam_circle(*set_back_mm) {
-                    Some(circle) => circle,
-                    None => Outline::Edges(self.cam_edges(*set_back_mm, stop)?),
+                let edges = match self.cam_circle(*set_back_mm) {
+                    Some(halves) => halves.into(),
+                    None => self.cam_edges(*set_back_mm, stop)?,
                 };
-                (Part::WaveGenerator, outer, bore_radius_mm.map(Outline::circle).into_iter().collect())
+                let bore = bore_radius_mm.map(|radius_mm| Outline::Circle { radius_mm });
+                (Part::WaveGenerator, Outline::Path { edges }, bore.into_iter().collect())
             }
-            MadePart::Carrier(carrier) => (Part::Carrier, Outline::Edges(finger(&self.drive, carrier)), Vec::new()),
+            MadePart::Carrier(carrier) => {
+                (Part::Carrier, Outline::Path { edges: finger(&self.drive, carrier) }, Vec::new())
+            }
             MadePart::Teeth { radius_mm, half_width_mm } => {
                 (Part::Teeth, tooth_outline(*radius_mm, *half_width_mm), Vec::new())
             }
         };
-        Ok(Body { part, outer, holes, placements: self.placements(part)? })
+        let is_ball = part == Part::Teeth && matches!(self.drive.parameters().tooth, ToothShape::Ball { .. });
+        Ok(Body {
+            part,
+            solid: if is_ball { BodySolid::Ball } else { BodySolid::Prism },
+            width_mm: self.drive.tooth_width_mm(),
+            outer,
+            holes,
+            placements: self.placements(part)?,
+        })
     }
 
     /// Returns the edges of the ring's tooth spaces, from tip to tip. Bored or rotated flanks leave lands between these.
@@ -217,34 +271,46 @@ impl Drawing {
             Some(end) if tip.has_land => 2.0 * (tip_rad - end.y.atan2(end.x)),
             _ => 0.0,
         };
-        let space = tooth_space(half, self.parameters.chord_tolerance_mm);
-        let start = space.first().map(Edge::start).unwrap_or_default();
+        let root_arc_rad = half.root_arc_rad;
+        let curve = |flank: &SampledCurve| Curve::new(flank, self.parameters.chord_tolerance_mm);
+        let flanks: Vec<_> = flanks(half).iter().map(curve).collect();
+        let (start, root) = (flanks[0].points[0], flanks[flanks.len() / 2].points[0]);
         let turned = |copy: u64| Rotation2::new(2.0 * PI * ((copy % teeth) as f64 / teeth as f64));
-        let mut edges = Vec::new();
+        let mut edges: Vec<Edge> = Vec::new();
+        let end_of = |edges: &[Edge]| Point2::from(edges.last().map(Edge::end).unwrap_or_default());
         for copy in 0..teeth {
             let next = turned(copy + 1) * start;
-            edges.extend(space.iter().map(|edge| edge.turned(&turned(copy))));
-            match edges.last_mut() {
-                Some(last) if tip.has_land => {
-                    let start = last.end();
-                    edges.push(Edge::Arc { start, end: next, radius_mm: tip.radius_mm, sweep_rad: land_rad });
+            for (index, flank) in flanks.iter().enumerate() {
+                let mut flank = flank.turned(&turned(copy));
+                if root_arc_rad > 0.0 && index == flanks.len() / 2 {
+                    let root_radius_mm = root.coords.norm();
+                    edges.push(Edge::arc(end_of(&edges), flank.points[0], root_radius_mm, 2.0 * root_arc_rad));
                 }
-                Some(last) => last.end_at(next),
-                None => {}
+                if !tip.has_land && index + 1 == flanks.len() {
+                    flank.end_at(next);
+                }
+                edges.push(flank.into());
+            }
+            if tip.has_land {
+                edges.push(Edge::arc(end_of(&edges), next, tip.radius_mm, land_rad));
             }
         }
         Ok(edges)
     }
 
-    /// Returns the outline of an eccentric with its lobe along x.
-    fn cam_circle(&self, set_back_mm: f64) -> Option<Outline> {
-        match self.drive.flank().cam {
-            Cam::Harmonic(harmonic) if harmonic.is_circle() => Some(Outline::Circle {
-                center: Point2::new(harmonic.amplitude_mm, 0.0),
-                radius_mm: harmonic.mean_radius_mm - set_back_mm,
-            }),
-            _ => None,
-        }
+    /// Returns the halves of an eccentric with its lobe along x, from the rightmost point through the uppermost one, and
+    /// back.
+    fn cam_circle(&self, set_back_mm: f64) -> Option<[Edge; 2]> {
+        let Cam::Harmonic(harmonic) = self.drive.flank().cam else { return None };
+        let (x_mm, radius_mm) = (harmonic.amplitude_mm, harmonic.mean_radius_mm - set_back_mm);
+        let half = |sign: f64| Edge::Arc {
+            x_mm: [x_mm + sign * radius_mm, x_mm, x_mm - sign * radius_mm],
+            y_mm: [0.0, sign * radius_mm, 0.0],
+            center_mm: [x_mm, 0.0],
+            radius_mm,
+            sweep_deg: 180.0,
+        };
+        harmonic.is_circle().then(|| [half(1.0), half(-1.0)])
     }
 
     /// Returns the edges of a cam between all lobes and valleys.
@@ -281,13 +347,12 @@ impl Drawing {
                 last += degree;
                 poles[last - degree..=last].to_vec()
             };
-            Edge::Curve {
+            Edge::from(Curve {
                 points,
-                start_tangent: across(index),
-                end_tangent: across((index + 1) % (2 * lobes)),
+                tangents: [across(index), across((index + 1) % (2 * lobes))],
                 polynomials: degrees.into_iter().map(polygon).collect(),
                 arcs: corners.iter().zip(bulges).map(|(&point, bulge)| ArcStart { point, bulge }).collect(),
-            }
+            })
         });
         Ok(edges.collect())
     }
@@ -298,33 +363,32 @@ impl Drawing {
     fn placements(&self, part: Part) -> Result<Vec<Placement>, SolveError> {
         let p = self.drive.parameters();
         // A carrier that is rotated away from the flank under load is slightly ahead of its teeth.
-        let (input_turns, turned_away) = match self.subject {
-            Subject::Part(_) => (0.0, 0.0),
-            Subject::Assembly => {
-                let away_rad = self.drive.sense() * self.carrier_rotation_rad;
-                (self.parameters.input_angle_deg / 360.0, away_rad / (2.0 * PI))
-            }
+        let is_assembly = self.subject == DrawnPart::Assembly;
+        let (input_turns, turned_away) = if is_assembly {
+            let away_rad = self.drive.sense() * self.carrier_rotation_rad;
+            (self.parameters.input_angle_deg / 360.0, away_rad / (2.0 * PI))
+        } else {
+            (0.0, 0.0)
         };
-        let turned =
-            |turns: f64| Placement { origin_mm: Point2::origin(), rotation_rad: 2.0 * PI * turns.rem_euclid(1.0) };
+        let rotation_rad = |turns: f64| 2.0 * PI * turns.rem_euclid(1.0);
+        let turned = |turns: f64| Placement { rotation_deg: rotation_rad(turns).to_degrees(), ..Placement::default() };
         let carrier_turns = input_turns / self.drive.transmission_ratio();
         let slots = (0..p.installed).map(|slot| slot as f64 / p.installed as f64);
-        Ok(match (part, self.subject) {
-            (Part::Ring, _) | (Part::Teeth, Subject::Part(_)) => vec![Placement::default()],
-            (Part::WaveGenerator, _) => vec![turned(input_turns)],
-            (Part::Carrier, _) => slots.map(|slot| turned(slot + carrier_turns + turned_away)).collect(),
-            (Part::Teeth, Subject::Assembly) => {
+        Ok(match part {
+            Part::WaveGenerator => vec![turned(input_turns)],
+            Part::Carrier => slots.map(|slot| turned(slot + carrier_turns + turned_away)).collect(),
+            Part::Teeth if is_assembly => {
                 let from_lobe = input_turns * (p.ring_teeth as f64 / p.teeth as f64);
                 let placed = slots.map(|slot| {
-                    let placement = turned(slot + carrier_turns);
-                    let (sin, cos) = placement.rotation_rad.sin_cos();
-                    let position_rad = 2.0 * PI * (slot - from_lobe).rem_euclid(1.0);
-                    let center_radius_mm = self.drive.flank().locus().center_radius_at_mm(position_rad)?;
-                    let origin_mm = Point2::from(center_radius_mm * Vector2::new(cos, sin));
-                    Ok(Placement { origin_mm, ..placement })
+                    let (sin, cos) = rotation_rad(slot + carrier_turns).sin_cos();
+                    let center_radius_mm =
+                        self.drive.flank().locus().center_radius_at_mm(rotation_rad(slot - from_lobe))?;
+                    let (x_mm, y_mm) = (center_radius_mm * cos, center_radius_mm * sin);
+                    Ok(Placement { x_mm, y_mm, ..turned(slot + carrier_turns) })
                 });
                 placed.collect::<Result<_, SolveError>>()?
             }
+            Part::Ring | Part::Teeth => vec![Placement::default()],
         })
     }
 
@@ -340,19 +404,6 @@ impl Drawing {
         let limit = self.parameters.max_points;
         if points > limit { Err(SolveError::TooManyPoints { points, limit }) } else { Ok(()) }
     }
-}
-
-/// Returns a tooth space of the ring from tip to tip, with its middle along x.
-fn tooth_space(half: HalfSpace, chord_tolerance_mm: f64) -> Vec<Edge> {
-    let root_arc_rad = half.root_arc_rad;
-    let mut edges: Vec<_> = flanks(half).iter().map(|flank| Edge::curve(flank, chord_tolerance_mm)).collect();
-    if root_arc_rad > 0.0 {
-        let middle = edges.len() / 2;
-        let (start, end) = (edges[middle - 1].end(), edges[middle].start());
-        let root = Edge::Arc { start, end, radius_mm: end.coords.norm(), sweep_rad: 2.0 * root_arc_rad };
-        edges.insert(middle, root);
-    }
-    edges
 }
 
 /// Returns the flanks of a tooth space from tip to tip. They are one curve if they are smooth at the root.
@@ -384,21 +435,20 @@ fn flanks(half: HalfSpace) -> Vec<SampledCurve> {
 
 /// Returns the outline of a tooth: a circle, or two arcs joined by flats parallel to its slot, which is along x.
 fn tooth_outline(radius_mm: f64, half_width_mm: f64) -> Outline {
-    if half_width_mm < radius_mm {
-        let half_length_mm = ((radius_mm - half_width_mm) * (radius_mm + half_width_mm)).sqrt();
-        let corner = |x: f64, y: f64| Point2::new(x * half_length_mm, y * half_width_mm);
-        let arc =
-            |start, end| Edge::Arc { start, end, radius_mm, sweep_rad: 2.0 * half_width_mm.atan2(half_length_mm) };
-        let (right, left) = ([corner(1.0, -1.0), corner(1.0, 1.0)], [corner(-1.0, 1.0), corner(-1.0, -1.0)]);
-        Outline::Edges(vec![
-            arc(right[0], right[1]),
-            Edge::Line { start: right[1], end: left[0] },
-            arc(left[0], left[1]),
-            Edge::Line { start: left[1], end: right[0] },
-        ])
-    } else {
-        Outline::circle(radius_mm)
+    if half_width_mm >= radius_mm {
+        return Outline::Circle { radius_mm };
     }
+    let half_length_mm = ((radius_mm - half_width_mm) * (radius_mm + half_width_mm)).sqrt();
+    let corner = |x: f64, y: f64| Point2::new(x * half_length_mm, y * half_width_mm);
+    let arc = |start, end| Edge::arc(start, end, radius_mm, 2.0 * half_width_mm.atan2(half_length_mm));
+    let (right, left) = ([corner(1.0, -1.0), corner(1.0, 1.0)], [corner(-1.0, 1.0), corner(-1.0, -1.0)]);
+    let edges = vec![
+        arc(right[0], right[1]),
+        Edge::line(right[1], left[0]),
+        arc(left[0], left[1]),
+        Edge::line(left[1], right[0]),
+    ];
+    Outline::Path { edges }
 }
 
 /// Returns the finger between slots 0 and 1 of the widest possible carrier: from the cam's major axis to the ring's
@@ -418,28 +468,18 @@ fn finger(drive: &Drive, carrier: &CarrierPart) -> Vec<Edge> {
     let on_next = |point: Point2<f64>| to_next * Point2::new(point.x, -point.y);
     let sweep_rad = |radius_mm: f64| 2.0 * (half_spacing_rad - (wall / radius_mm).asin());
     let outer = on_wall(outer_radius_mm);
-    let rim = Edge::Arc {
-        start: outer,
-        end: on_next(outer),
-        radius_mm: outer_radius_mm,
-        sweep_rad: sweep_rad(outer_radius_mm),
-    };
+    let rim = Edge::arc(outer, on_next(outer), outer_radius_mm, sweep_rad(outer_radius_mm));
     let meet_radius_mm = wall / half_spacing_rad.sin();
     if meet_radius_mm < inner_radius_mm {
         let inner = on_wall(inner_radius_mm);
         vec![
-            Edge::Line { start: inner, end: outer },
+            Edge::line(inner, outer),
             rim,
-            Edge::Line { start: on_next(outer), end: on_next(inner) },
-            Edge::Arc {
-                start: on_next(inner),
-                end: inner,
-                radius_mm: inner_radius_mm,
-                sweep_rad: -sweep_rad(inner_radius_mm),
-            },
+            Edge::line(on_next(outer), on_next(inner)),
+            Edge::arc(on_next(inner), inner, inner_radius_mm, -sweep_rad(inner_radius_mm)),
         ]
     } else {
         let point = Point2::new(meet_radius_mm * half_spacing_rad.cos(), wall);
-        vec![Edge::Line { start: point, end: outer }, rim, Edge::Line { start: on_next(outer), end: point }]
+        vec![Edge::line(point, outer), rim, Edge::line(on_next(outer), point)]
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Rotation2, Unit, Vector2};
 
 use crate::arcs::{self, ArcStart};
-use crate::profile::{Polyline, SampledCurve};
+use crate::profile::{Polyline, SampledCurve, on_circle};
 use crate::spline;
 
 /// Largest distance of polynomials from their curve, as a share of the chord tolerance. With it, solids of tolerance
@@ -14,120 +14,159 @@ pub const SPLINE_SHARE_OF_CHORD: f64 = 0.01;
 /// alone are too few to define the curve between them.
 pub(crate) const POINTS_PER_CHORD: u32 = 4;
 
-/// Closed path. Each edge starts exactly at the end point of the edge before, the first at that of the last.
+/// Closed path. Each edge starts exactly at the end point of the edge before, the first at that of the last. Edges are
+/// counter-clockwise.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(tag = "kind", rename_all = "snake_case"), schema(as = OutlineAnswer))]
 pub enum Outline {
-    /// A circle.
+    /// A circle around the origin.
     Circle {
-        /// Centre of the circle.
-        center: Point2<f64>,
         /// Radius of the circle.
         radius_mm: f64,
     },
-    /// Edges, in counter-clockwise order.
-    Edges(Vec<Edge>),
+    /// Consecutive edges.
+    Path {
+        /// The edges.
+        edges: Vec<Edge>,
+    },
 }
 
 /// Edge of an outline.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "document", derive(serde::Serialize, utoipa::ToSchema))]
+#[cfg_attr(feature = "document", serde(tag = "kind", rename_all = "snake_case"), schema(as = EdgeAnswer))]
 pub enum Edge {
-    /// A straight line.
+    /// A straight line between two points.
     Line {
-        /// Start point.
-        start: Point2<f64>,
-        /// End point.
-        end: Point2<f64>,
+        /// x of the two ends.
+        x_mm: [f64; 2],
+        /// y of the two ends.
+        y_mm: [f64; 2],
     },
-    /// An arc of a circle around the origin.
+    /// An arc of a circle.
     Arc {
-        /// Start point.
-        start: Point2<f64>,
-        /// End point.
-        end: Point2<f64>,
+        /// x of its start, its middle and its end.
+        x_mm: [f64; 3],
+        /// y of its start, its middle and its end.
+        y_mm: [f64; 3],
+        /// x and y of the circle's centre.
+        center_mm: [f64; 2],
         /// Radius of the circle.
         radius_mm: f64,
-        /// Angle of the arc, counter-clockwise positive, at most one full turn.
-        sweep_rad: f64,
+        /// Angle of the arc, counter-clockwise positive.
+        sweep_deg: f64,
     },
-    /// A smooth curve through exact points, with chords within the tolerance.
+    /// A smooth curve through exact points, with chords within the chord tolerance. Interpolate it, or use the chords.
     Curve {
-        /// The points, both ends included.
-        points: Polyline,
-        /// Direction at the first point.
-        start_tangent: Unit<Vector2<f64>>,
+        /// x of the points.
+        x_mm: Vec<f64>,
+        /// y of the points.
+        y_mm: Vec<f64>,
+        /// Direction at the first point, from the x axis.
+        start_tangent_deg: f64,
         /// Direction at the last point.
-        end_tangent: Unit<Vector2<f64>>,
+        end_tangent_deg: f64,
         /// Control polygons of consecutive Bézier polynomials with a common tangent, within [`SPLINE_SHARE_OF_CHORD`]
-        /// of the tolerance.
+        /// of the tolerance, that replace the curve in solids.
+        #[cfg_attr(feature = "document", serde(skip))]
         polynomials: Vec<Polyline>,
-        /// Consecutive arcs with a common tangent, within the tolerance.
+        /// Consecutive arcs with a common tangent, within the tolerance, that replace the curve in DXF.
+        #[cfg_attr(feature = "document", serde(skip))]
         arcs: Vec<ArcStart>,
     },
 }
 
 impl Edge {
-    /// Returns the start point.
-    pub fn start(&self) -> Point2<f64> {
-        match self {
-            Self::Line { start, .. } | Self::Arc { start, .. } => *start,
-            Self::Curve { points, .. } => points.first().copied().unwrap_or_default(),
+    pub(crate) fn line(start: Point2<f64>, end: Point2<f64>) -> Self {
+        Self::Line { x_mm: [start.x, end.x], y_mm: [start.y, end.y] }
+    }
+
+    /// Creates an arc around the origin, at most one full turn.
+    pub(crate) fn arc(start: Point2<f64>, end: Point2<f64>, radius_mm: f64, sweep_rad: f64) -> Self {
+        let middle = on_circle(radius_mm, start.y.atan2(start.x) + 0.5 * sweep_rad);
+        Self::Arc {
+            x_mm: [start.x, middle.x, end.x],
+            y_mm: [start.y, middle.y, end.y],
+            center_mm: [0.0; 2],
+            radius_mm,
+            sweep_deg: sweep_rad.to_degrees(),
         }
+    }
+
+    /// Returns x and y of the points, which are on the edge, from start to end.
+    pub fn points(&self) -> impl DoubleEndedIterator<Item = [f64; 2]> + ExactSizeIterator {
+        let (x_mm, y_mm) = match self {
+            Self::Line { x_mm, y_mm } => (&x_mm[..], &y_mm[..]),
+            Self::Arc { x_mm, y_mm, .. } => (&x_mm[..], &y_mm[..]),
+            Self::Curve { x_mm, y_mm, .. } => (&x_mm[..], &y_mm[..]),
+        };
+        x_mm.iter().zip(y_mm).map(|(&x, &y)| [x, y])
+    }
+
+    /// Returns the start point.
+    pub fn start(&self) -> [f64; 2] {
+        self.points().next().unwrap_or_default()
     }
 
     /// Returns the end point.
-    pub fn end(&self) -> Point2<f64> {
-        match self {
-            Self::Line { end, .. } | Self::Arc { end, .. } => *end,
-            Self::Curve { points, .. } => points.last().copied().unwrap_or_default(),
-        }
+    pub fn end(&self) -> [f64; 2] {
+        self.points().next_back().unwrap_or_default()
     }
+}
 
-    /// Returns the edge rotated about the origin.
-    pub(crate) fn turned(&self, rotation: &Rotation2<f64>) -> Self {
-        let tangent = |tangent: &Unit<Vector2<f64>>| Unit::new_unchecked(rotation * tangent.into_inner());
-        let turned = |points: &Polyline| -> Polyline { points.iter().map(|point| rotation * point).collect() };
-        match self {
-            Self::Line { start, end } => Self::Line { start: rotation * start, end: rotation * end },
-            Self::Arc { start, end, radius_mm, sweep_rad } => {
-                Self::Arc { start: rotation * start, end: rotation * end, radius_mm: *radius_mm, sweep_rad: *sweep_rad }
-            }
-            Self::Curve { points, start_tangent, end_tangent, polynomials, arcs } => Self::Curve {
-                points: turned(points),
-                start_tangent: tangent(start_tangent),
-                end_tangent: tangent(end_tangent),
-                polynomials: polynomials.iter().map(turned).collect(),
-                arcs: arcs.iter().map(|arc| ArcStart { point: rotation * arc.point, bulge: arc.bulge }).collect(),
-            },
-        }
-    }
+/// Curve of an outline, before it is placed.
+pub(crate) struct Curve {
+    pub(crate) points: Polyline,
+    /// Directions at the first point and at the last one.
+    pub(crate) tangents: [Unit<Vector2<f64>>; 2],
+    pub(crate) polynomials: Vec<Polyline>,
+    pub(crate) arcs: Vec<ArcStart>,
+}
 
+impl Curve {
     /// Creates a curve from points with [`POINTS_PER_CHORD`].
-    pub(crate) fn curve(sampled: &SampledCurve, chord_tolerance_mm: f64) -> Self {
+    pub(crate) fn new(sampled: &SampledCurve, chord_tolerance_mm: f64) -> Self {
         let SampledCurve { points, tangents } = sampled;
-        Self::Curve {
+        Self {
             points: ends_of_chords(points),
-            start_tangent: tangents[0],
-            end_tangent: tangents[tangents.len() - 1],
+            tangents: [tangents[0], tangents[tangents.len() - 1]],
             polynomials: spline::polygons(sampled, SPLINE_SHARE_OF_CHORD * chord_tolerance_mm),
             arcs: arcs::arcs(sampled, chord_tolerance_mm),
         }
     }
 
-    /// Moves the end of a curve exactly to the start of the next edge.
+    /// Returns the curve rotated about the origin.
+    pub(crate) fn turned(&self, rotation: &Rotation2<f64>) -> Self {
+        let turned = |points: &Polyline| -> Polyline { points.iter().map(|point| rotation * point).collect() };
+        Self {
+            points: turned(&self.points),
+            tangents: self.tangents.map(|tangent| Unit::new_unchecked(rotation * tangent.into_inner())),
+            polynomials: self.polynomials.iter().map(turned).collect(),
+            arcs: self.arcs.iter().map(|arc| ArcStart { point: rotation * arc.point, bulge: arc.bulge }).collect(),
+        }
+    }
+
+    /// Moves the end exactly to the start of the next edge.
     pub(crate) fn end_at(&mut self, next: Point2<f64>) {
-        if let Self::Curve { points, polynomials, .. } = self {
-            for polygon in polynomials.last_mut().into_iter().chain([points]) {
-                polygon.pop();
-                polygon.push(next);
-            }
+        for points in self.polynomials.last_mut().into_iter().chain([&mut self.points]) {
+            points.pop();
+            points.push(next);
         }
     }
 }
 
-impl Outline {
-    /// Returns a circle around the origin.
-    pub(crate) const fn circle(radius_mm: f64) -> Self {
-        Self::Circle { center: Point2::new(0.0, 0.0), radius_mm }
+impl From<Curve> for Edge {
+    fn from(Curve { points, tangents, polynomials, arcs }: Curve) -> Self {
+        let [start_tangent_deg, end_tangent_deg] = tangents.map(|tangent| tangent.y.atan2(tangent.x).to_degrees());
+        Self::Curve {
+            x_mm: points.iter().map(|point| point.x).collect(),
+            y_mm: points.iter().map(|point| point.y).collect(),
+            start_tangent_deg,
+            end_tangent_deg,
+            polynomials,
+            arcs,
+        }
     }
 }
 

@@ -2,9 +2,8 @@
 
 use serde_json::{Value, json};
 use toothwave_calculation::convert::converted;
-use toothwave_calculation::drawing::Drawing;
-use toothwave_calculation::drawing::answer::DrawnPart;
 use toothwave_calculation::drawing::preset::Preset;
+use toothwave_calculation::drawing::{Drawing, DrawnPart};
 use toothwave_calculation::field::FieldCode;
 use toothwave_calculation::no_answer::NoAnswer;
 use toothwave_calculation::question::{Limits, Question};

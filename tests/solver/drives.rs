@@ -1,10 +1,11 @@
 //! Drives and loads that many tests share.
 
 use proptest::prelude::*;
+use toothwave_solver::drawing::DrawnPart;
 use toothwave_solver::mesh::Mesh;
 use toothwave_solver::{
-    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact, ToothShape, Torque,
-    WaveGenerator,
+    Compatibility, ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, Part, PerContact, ToothShape,
+    Torque, WaveGenerator,
     sweep::{self, Points, Sweep},
 };
 
@@ -65,6 +66,16 @@ pub(crate) const ECCENTRIC: DriveParameters = DriveParameters {
 
 pub(crate) fn drive(parameters: &DriveParameters) -> Drive {
     Drive::new(parameters).expect("a possible drive")
+}
+
+/// Returns the subject of a drawing of one part.
+pub(crate) const fn drawn_part(part: Part) -> DrawnPart {
+    match part {
+        Part::Ring => DrawnPart::Ring,
+        Part::Carrier => DrawnPart::Carrier,
+        Part::Teeth => DrawnPart::Tooth,
+        Part::WaveGenerator => DrawnPart::WaveGenerator,
+    }
 }
 
 /// Returns a load with steel throughout and linear stiffness.

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Vector2};
 use proptest::prelude::*;
 use toothwave_solver::Compatibility::{Projection, VirtualWork};
-use toothwave_solver::drawing::{Drawing, DrawingParameters, Subject};
+use toothwave_solver::drawing::{Drawing, DrawingParameters, DrawnPart};
 use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::load_sharing::LoadedDrive;
 use toothwave_solver::losses::{LoadedTooth, Mechanism};
@@ -943,7 +943,7 @@ fn assembly_places_every_tooth_on_path_in_slot() {
         let (n, input_angle_deg) = (p.installed as f64, 7.0_f64);
         let parameters = DrawingParameters { chord_tolerance_mm: 1e-2, max_points: 1_000_000, input_angle_deg };
         let draft = Draft::new(&p).unwrap();
-        let drawing = Drawing::new(&draft, Subject::Assembly, &PartsParameters::default(), &parameters).unwrap();
+        let drawing = Drawing::new(&draft, DrawnPart::Assembly, &PartsParameters::default(), &parameters).unwrap();
         let teeth = drawing.bodies(&Never).unwrap().into_iter().find(|body| body.part == Part::Teeth).unwrap();
         assert_eq!(Ok(teeth.placements.len()), usize::try_from(p.installed));
         let cam_rad = input_angle_deg.to_radians();
@@ -952,7 +952,7 @@ fn assembly_places_every_tooth_on_path_in_slot() {
             let angle_rad = carrier_rad + 2.0 * PI * slot as f64 / n;
             let from_lobe_rad = (angle_rad - cam_rad).rem_euclid(2.0 * PI);
             let expected = center_radius_mm(&p, from_lobe_rad) * Vector2::new(angle_rad.cos(), angle_rad.sin());
-            let off_mm = (placement.origin_mm.coords - expected).norm();
+            let off_mm = (Vector2::new(placement.x_mm, placement.y_mm) - expected).norm();
             assert!(off_mm < 1e-9 * expected.norm(), "slot {slot} of {p:?} is {off_mm} mm off");
         }
     }

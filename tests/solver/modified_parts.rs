@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point2, Rotation2, Vector2};
 use proptest::prelude::*;
-use toothwave_solver::drawing::{Body, Drawing, DrawingParameters, Edge, Outline, Subject};
+use toothwave_solver::drawing::{Body, Drawing, DrawingParameters, DrawnPart, Edge, Outline};
 use toothwave_solver::drive::{Draft, DriveError};
 use toothwave_solver::gaps::{Gaps, TipRelief};
 use toothwave_solver::mesh::Place;
@@ -15,7 +15,7 @@ use toothwave_solver::{
     Position, ToothShape, Violation, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, cases, drive, ellipse};
+use crate::drives::{PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, cases, drawn_part, drive, ellipse};
 
 const NONE: Modification = Modification::NONE;
 const ARCSEC: f64 = PI / 648_000.0;
@@ -125,7 +125,7 @@ fn parts(modification: Modification) -> PartsParameters {
     PartsParameters { modification, ..PartsParameters::default() }
 }
 
-fn drawn(p: &DriveParameters, subject: Subject, parts: &PartsParameters, tolerance_mm: f64, deg: f64) -> Vec<Body> {
+fn drawn(p: &DriveParameters, subject: DrawnPart, parts: &PartsParameters, tolerance_mm: f64, deg: f64) -> Vec<Body> {
     let parameters =
         DrawingParameters { chord_tolerance_mm: tolerance_mm, max_points: 10_000_000, input_angle_deg: deg };
     Drawing::new(&Draft::new(p).unwrap(), subject, parts, &parameters).unwrap().bodies(&Never).unwrap()
@@ -133,24 +133,24 @@ fn drawn(p: &DriveParameters, subject: Subject, parts: &PartsParameters, toleran
 
 fn edges(outline: &Outline) -> &[Edge] {
     match outline {
-        Outline::Edges(edges) => edges,
+        Outline::Path { edges } => edges,
         Outline::Circle { .. } => panic!("a circle"),
     }
 }
 
 /// Returns the ring's edges in one tooth space, from tip to tip.
 fn space(p: &DriveParameters, modification: Modification) -> Vec<Edge> {
-    let ring = drawn(p, Subject::Part(Part::Ring), &parts(modification), 1e-4, 0.0).remove(0);
+    let ring = drawn(p, DrawnPart::Ring, &parts(modification), 1e-4, 0.0).remove(0);
     let edges = edges(&ring.holes[0]);
     let count = edges.len() / usize::try_from(p.ring_teeth).unwrap();
     assert_eq!(edges.len() % count, 0);
     edges[..count].to_vec()
 }
 
-fn points(edge: &Edge) -> &[Point2<f64>] {
+fn points(edge: &Edge) -> Vec<Point2<f64>> {
     match edge {
-        Edge::Curve { points, .. } => points,
-        Edge::Line { .. } | Edge::Arc { .. } => &[],
+        Edge::Curve { .. } => edge.points().map(Point2::from).collect(),
+        Edge::Line { .. } | Edge::Arc { .. } => Vec::new(),
     }
 }
 
@@ -259,18 +259,18 @@ fn drawn_distances_equal_model_gaps() {
         let sense = drive.sense();
         let flank_end_rad = drive.flank_limit().position.from_lobe_rad;
         for m in modifications {
-            let bodies = drawn(&p, Subject::Assembly, &parts(m), 1e-5, 7.0);
+            let bodies = drawn(&p, DrawnPart::Assembly, &parts(m), 1e-5, 7.0);
             let [ring, carrier, teeth, cam] = &bodies[..] else { panic!("{bodies:?}") };
             let ring_points = placed_outline(&ring.holes[0], 0.0);
-            let cam_points = placed_outline(&cam.outer, cam.placements[0].rotation_rad);
+            let cam_points = placed_outline(&cam.outer, cam.placements[0].rotation_deg);
             let Outline::Circle { radius_mm, .. } = teeth.outer else { panic!("a tooth is round") };
             let fingers = carrier.placements.len();
             let mut looked_at = 0;
             for (slot, tooth) in teeth.placements.iter().enumerate() {
-                let center = tooth.origin_mm;
+                let center = Point2::new(tooth.x_mm, tooth.y_mm);
                 let lobes = drive.lobes();
                 let pitch = 2.0 * PI / f64::from(lobes);
-                let from_lobe = (tooth.rotation_rad - 7.0_f64.to_radians()).rem_euclid(pitch);
+                let from_lobe = (tooth.rotation_deg - 7.0).to_radians().rem_euclid(pitch);
                 if from_lobe < 0.02 * pitch || from_lobe > 0.96 * flank_end_rad {
                     continue;
                 }
@@ -280,7 +280,7 @@ fn drawn_distances_equal_model_gaps() {
                 let gap = gaps.at(&Place::default(), &at, &drive.flank().at(&at));
                 // The wall under load is ahead of the tooth if the carrier turns forward, else behind it.
                 let finger = if sense > 0.0 { slot } else { (slot + fingers - 1) % fingers };
-                let walls = placed_outline(&carrier.outer, carrier.placements[finger].rotation_rad);
+                let walls = placed_outline(&carrier.outer, carrier.placements[finger].rotation_deg);
                 for (name, outline, gap_mm) in [
                     ("ring", &ring_points, gap.ring),
                     ("cam", &cam_points, gap.wave_generator),
@@ -295,22 +295,22 @@ fn drawn_distances_equal_model_gaps() {
     }
 }
 
-fn placed_outline(outline: &Outline, rotation_rad: f64) -> Vec<Point2<f64>> {
-    match outline {
-        Outline::Edges(edges) => placed(edges, rotation_rad),
-        // Chords within 2 nm of a radius of 31 mm.
-        Outline::Circle { center, radius_mm } => {
-            let at = |i: i32| Rotation2::new(PI * f64::from(i) / 5_000.0) * Vector2::new(*radius_mm, 0.0);
-            (0..10_000).map(|i| Rotation2::new(rotation_rad) * (center + at(i))).collect()
-        }
-    }
+fn placed_outline(outline: &Outline, rotation_deg: f64) -> Vec<Point2<f64>> {
+    placed(edges(outline), rotation_deg)
 }
 
-fn placed(edges: &[Edge], rotation_rad: f64) -> Vec<Point2<f64>> {
-    let rotation = Rotation2::new(rotation_rad);
+/// Returns points of the edges. On an arc chords are within 2 nm of a radius of 31 mm.
+fn placed(edges: &[Edge], rotation_deg: f64) -> Vec<Point2<f64>> {
+    let rotation = Rotation2::new(rotation_deg.to_radians());
     let of_edge = |edge: &Edge| match edge {
-        Edge::Curve { points, .. } => points.clone(),
-        Edge::Line { start, end } | Edge::Arc { start, end, .. } => vec![*start, *end],
+        Edge::Arc { center_mm, sweep_deg, .. } => {
+            let center = Point2::from(*center_mm);
+            let start = Point2::from(edge.start()) - center;
+            let chords = (sweep_deg.abs() / 0.036).ceil();
+            let at = |i: i32| Rotation2::new(sweep_deg.to_radians() * f64::from(i) / chords) * start;
+            (0..).take_while(|&i| f64::from(i) <= chords).map(|i| center + at(i)).collect()
+        }
+        Edge::Line { .. } | Edge::Curve { .. } => edge.points().map(Point2::from).collect::<Vec<_>>(),
     };
     edges.iter().flat_map(of_edge).map(|point| rotation * point).collect()
 }
@@ -329,16 +329,17 @@ fn distance(outline: &[Point2<f64>], point: Point2<f64>) -> f64 {
 fn modified_outlines_close_with_matching_tangents() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for m in of_the_ring() {
-            let ring = drawn(&p, Subject::Part(Part::Ring), &parts(m), 1e-6, 0.0).remove(0);
+            let ring = drawn(&p, DrawnPart::Ring, &parts(m), 1e-6, 0.0).remove(0);
             let edges = edges(&ring.holes[0]);
             for (edge, next) in edges.iter().zip(edges.iter().cycle().skip(1)) {
                 assert_eq!(edge.end(), next.start());
-                let Edge::Curve { points, start_tangent, end_tangent, .. } = edge else { continue };
+                let Edge::Curve { start_tangent_deg, end_tangent_deg, .. } = edge else { continue };
                 // A chord of a thousandth of a radian turns by as much, at a steep start of a relief by more.
                 let steep = m.ring_tip_relief.is_some_and(|relief| relief.power < 2.0);
+                let points = points(edge);
                 let [first, second, .., before, last] = &points[..] else { panic!("{points:?}") };
-                for (chord, tangent) in [(second - first, start_tangent), (last - before, end_tangent)] {
-                    let along = chord.normalize().dot(tangent);
+                for (chord, tangent_deg) in [(second - first, start_tangent_deg), (last - before, end_tangent_deg)] {
+                    let along = chord.normalize().dot(&unit(tangent_deg.to_radians()));
                     assert!(along > if steep { 0.9 } else { 1.0 - 1e-5 }, "{along} of {m:?} on {p:?}");
                 }
             }
@@ -347,7 +348,7 @@ fn modified_outlines_close_with_matching_tangents() {
                 let points = placed(edges, 0.0);
                 points.iter().zip(points.iter().cycle().skip(1)).map(|(a, b)| 0.5 * a.coords.perp(&b.coords)).sum()
             };
-            let plain = drawn(&p, Subject::Part(Part::Ring), &PartsParameters::default(), 1e-4, 0.0).remove(0);
+            let plain = drawn(&p, DrawnPart::Ring, &PartsParameters::default(), 1e-4, 0.0).remove(0);
             let ratio = shoelace(edges) / shoelace(self::edges(&plain.holes[0]));
             assert!((ratio - 1.0).abs() < 5e-3, "{ratio} of {m:?} on {p:?}");
         }
@@ -357,22 +358,22 @@ fn modified_outlines_close_with_matching_tangents() {
 #[test]
 fn turned_flanks_leave_arc_or_land() {
     let turned = |arcsec| space(&PAPER_5_1, Modification { ring_rotation_arcsec: arcsec, ..NONE });
-    let [Edge::Curve { points: lower, .. }, Edge::Arc { radius_mm, sweep_rad, .. }, Edge::Curve { points: upper, .. }] =
-        &turned(120.0)[..]
+    let apart = turned(120.0);
+    let [lower @ Edge::Curve { .. }, Edge::Arc { radius_mm, sweep_deg, .. }, upper @ Edge::Curve { .. }] = &apart[..]
     else {
-        panic!("{:?}", turned(120.0))
+        panic!("{apart:?}")
     };
-    assert!((radius_mm - 68.0).abs() < 1e-12 && (sweep_rad - 240.0 * ARCSEC).abs() < 1e-15);
+    assert!((radius_mm - 68.0).abs() < 1e-12 && (sweep_deg.to_radians() - 240.0 * ARCSEC).abs() < 1e-15);
     // Thinned from both sides, the ring's teeth are points outside the regular tip at 66.
-    let tip = lower[0].coords.norm();
-    assert!(tip > 66.0 && tip < 66.2 && (upper.last().unwrap().coords.norm() - tip).abs() < 1e-12, "{tip}");
+    let [tip, other_tip] = [lower.start(), upper.end()].map(|point| Point2::from(point).coords.norm());
+    assert!(tip > 66.0 && tip < 66.2 && (other_tip - tip).abs() < 1e-12, "{tip}");
     let together = turned(-120.0);
-    let [Edge::Curve { .. }, Edge::Curve { points: upper, .. }, Edge::Arc { radius_mm, sweep_rad, .. }] = &together[..]
-    else {
+    let [Edge::Curve { .. }, upper @ Edge::Curve { .. }, Edge::Arc { radius_mm, sweep_deg, .. }] = &together[..] else {
         panic!("{together:?}")
     };
-    assert!((radius_mm - 66.0).abs() < 1e-12 && (sweep_rad - 240.0 * ARCSEC).abs() < 1e-13);
-    assert!(upper[0].y == 0.0 && upper[0].x < 68.0);
+    assert!((radius_mm - 66.0).abs() < 1e-12 && (sweep_deg.to_radians() - 240.0 * ARCSEC).abs() < 1e-13);
+    let [x_mm, y_mm] = upper.start();
+    assert!(y_mm == 0.0 && x_mm < 68.0);
 }
 
 #[test]
@@ -400,7 +401,7 @@ fn equidistant_modification_draws_as_clearance() {
                 Modification { tooth_radius_um: 30.0, ..NONE },
             ),
         ] {
-            let draw = |parts: &PartsParameters| drawn(&p, Subject::Part(part), parts, 1e-3, 0.0);
+            let draw = |parts: &PartsParameters| drawn(&p, drawn_part(part), parts, 1e-3, 0.0);
             assert_eq!(draw(&clearance), draw(&parts(modification)), "{part:?}");
         }
     }
@@ -469,11 +470,11 @@ fn rim_starts_outside_root_as_made() {
 fn drawing_keeps_expected_point_count() {
     for p in [PAPER_5_1, PAPER_5_2, eccentric(), three_lobes()] {
         for (subject, has_curves) in [
-            (Subject::Part(Part::Ring), true),
-            (Subject::Part(Part::WaveGenerator), !matches!(p.wave_generator, WaveGenerator::Eccentric { .. })),
-            (Subject::Assembly, true),
-            (Subject::Part(Part::Carrier), false),
-            (Subject::Part(Part::Teeth), false),
+            (DrawnPart::Ring, true),
+            (DrawnPart::WaveGenerator, !matches!(p.wave_generator, WaveGenerator::Eccentric { .. })),
+            (DrawnPart::Assembly, true),
+            (DrawnPart::Carrier, false),
+            (DrawnPart::Tooth, false),
         ] {
             for tolerance_mm in [1e-2, 1e-4] {
                 let parameters = DrawingParameters {
@@ -486,8 +487,8 @@ fn drawing_keeps_expected_point_count() {
                 let bodies = drawing.bodies(&Never).unwrap();
                 let outlines = bodies.iter().flat_map(|body| body.holes.iter().chain([&body.outer]));
                 let points: usize = outlines
-                    .flat_map(|outline| if let Outline::Edges(edges) = outline { &edges[..] } else { &[] })
-                    .map(|edge| if let Edge::Curve { points, .. } = edge { points.len() } else { 0 })
+                    .flat_map(|outline| if let Outline::Path { edges } = outline { &edges[..] } else { &[] })
+                    .map(|edge| if let Edge::Curve { x_mm, .. } = edge { x_mm.len() } else { 0 })
                     .sum();
                 assert_eq!(points > 0, has_curves);
                 let expected = drawing.expected_points();
@@ -522,7 +523,7 @@ fn smooth_space_is_one_curve_and_relief_another() {
 #[test]
 fn low_relief_leaves_rim_unchanged() {
     let outer = |modification| {
-        let ring = drawn(&PAPER_5_1, Subject::Part(Part::Ring), &parts(modification), 1e-2, 0.0).remove(0);
+        let ring = drawn(&PAPER_5_1, DrawnPart::Ring, &parts(modification), 1e-2, 0.0).remove(0);
         ring.outer
     };
     assert_eq!(outer(Modification { ring_tip_relief: Some(RELIEF), ..NONE }), outer(NONE));
@@ -564,11 +565,11 @@ proptest! {
         let tolerance_mm = 1e-5 * p.tooth_radius_mm;
         let parameters = DrawingParameters { chord_tolerance_mm: tolerance_mm, max_points: 10_000_000, input_angle_deg: 0.0 };
         let draft = Draft::new(&p).unwrap();
-        let Ok(drawing) = Drawing::new(&draft, Subject::Part(Part::Ring), &parts, &parameters) else { return Ok(()) };
+        let Ok(drawing) = Drawing::new(&draft, DrawnPart::Ring, &parts, &parameters) else { return Ok(()) };
         let body = drawing.bodies(&Never).unwrap().remove(0);
         let of_hole = edges(&body.holes[0]);
         let farthest = |points: &[Point2<f64>]| points.iter().map(|point| point.coords.norm()).fold(0.0, f64::max);
-        let drawn_mm = of_hole.iter().map(|edge| farthest(points(edge)).max(edge.start().coords.norm())).fold(0.0, f64::max);
+        let drawn_mm = of_hole.iter().map(|edge| farthest(&points(edge)).max(Point2::from(edge.start()).coords.norm())).fold(0.0, f64::max);
 
         let reach_mm = reported_reach_mm(&p, &parts);
         prop_assert!(reach_mm >= drawn_mm * (1.0 - 1e-11), "{reach_mm} told, {drawn_mm} drawn");
@@ -576,7 +577,7 @@ proptest! {
         let Outline::Circle { radius_mm, .. } = body.outer else { panic!("{:?}", body.outer) };
         prop_assert!((radius_mm - RIM * reach_mm).abs() < 1e-12 * radius_mm);
         let thin = PartsParameters { ring_outer_radius_mm: Some(reach_mm * (1.0 + 1e-3)), ..parts };
-        let found = Drawing::new(&draft, Subject::Part(Part::Ring), &thin, &parameters).unwrap().findings().unwrap();
+        let found = Drawing::new(&draft, DrawnPart::Ring, &thin, &parameters).unwrap().findings().unwrap();
         let is_rim = |finding: &&Finding| finding.code == FindingCode::ThinWallAsMade && finding.contact == Some(Contact::Ring);
         let walls: Vec<_> = found.iter().filter(is_rim).map(|finding| finding.value).collect();
         prop_assert!(matches!(walls[..], [wall_mm] if (wall_mm - 1e-3 * reach_mm).abs() < 1e-11 * reach_mm), "{walls:?}");
@@ -604,7 +605,7 @@ fn outward_relief_at_root_reduces_rim() {
 fn excessive_modification_is_refused_at_its_number() {
     let refused = |p: &DriveParameters, part, modification| {
         let parameters = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
-        match Drawing::new(&Draft::new(p).unwrap(), Subject::Part(part), &parts(modification), &parameters) {
+        match Drawing::new(&Draft::new(p).unwrap(), drawn_part(part), &parts(modification), &parameters) {
             Err(DriveError::Impossible(violations)) => violations,
             other => panic!("{other:?}"),
         }
@@ -681,7 +682,7 @@ fn relief_rising_out_of_its_space_is_refused() {
         let modification =
             Modification { ring_rotation_arcsec: -10.0, ring_tip_relief: Some(relief), ..Modification::default() };
         let parameters = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
-        let subject = Subject::Part(Part::Ring);
+        let subject = DrawnPart::Ring;
         Drawing::new(&Draft::new(&p).unwrap(), subject, &parts(modification), &parameters)
     };
     let modified = Modified::TipReliefAmount;
@@ -704,7 +705,7 @@ fn chord_with_several_inflections_keeps_tolerance() {
         let ring_tip_relief = Some(TipRelief { amount_um, start_deg, power });
         let parts = parts(Modification { ring_tip_relief, ..NONE });
         for tolerance_mm in [1e-6, 2e-6, 4e-6, 8e-6] {
-            let ring = drawn(&p, Subject::Part(Part::Ring), &parts, tolerance_mm, 0.0).remove(0);
+            let ring = drawn(&p, DrawnPart::Ring, &parts, tolerance_mm, 0.0).remove(0);
             let edges = edges(&ring.holes[0]);
             let space = placed(&edges[..edges.len() / usize::try_from(p.ring_teeth).unwrap()], 0.0);
             let upper: Vec<_> = space.into_iter().filter(|point| point.y >= 0.0).collect();
@@ -752,7 +753,7 @@ fn solid_polynomials_keep_hundredth_of_chord_tolerance() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for tolerance_mm in [1e-2, 1e-3, 1e-5] {
             let near_mm = 0.01 * tolerance_mm;
-            let ring = drawn(&p, Subject::Part(Part::Ring), &parts(NONE), tolerance_mm, 0.0).remove(0);
+            let ring = drawn(&p, DrawnPart::Ring, &parts(NONE), tolerance_mm, 0.0).remove(0);
             let edges = edges(&ring.holes[0]);
             let of_space = edges.len() / usize::try_from(p.ring_teeth).unwrap();
             for polygon in polynomials(&edges[..of_space]) {
@@ -763,7 +764,7 @@ fn solid_polynomials_keep_hundredth_of_chord_tolerance() {
                 }
             }
             if let WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } = p.wave_generator {
-                let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts(NONE), tolerance_mm, 0.0).remove(0);
+                let cam = drawn(&p, DrawnPart::WaveGenerator, &parts(NONE), tolerance_mm, 0.0).remove(0);
                 for point in polynomials(self::edges(&cam.outer)).iter().flat_map(|polygon| along(polygon)) {
                     // Distance from the ellipse to first order.
                     let slope = 2.0 * (point.x / (a * a)).hypot(point.y / (b * b));
@@ -780,13 +781,13 @@ fn polynomials_join_tangentially_and_end_with_curve() {
     for p in [PAPER_5_1, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for m in of_the_ring().into_iter().chain([NONE]) {
             for part in [Part::Ring, Part::WaveGenerator] {
-                let body = drawn(&p, Subject::Part(part), &parts(m), 1e-3, 0.0).remove(0);
+                let body = drawn(&p, drawn_part(part), &parts(m), 1e-3, 0.0).remove(0);
                 let outline = body.holes.first().unwrap_or(&body.outer);
-                let Outline::Edges(edges) = outline else { continue };
+                let Outline::Path { edges } = outline else { continue };
                 for edge in edges {
                     let Edge::Curve { polynomials: polygons, .. } = edge else { continue };
                     let ends = (polygons[0][0], *polygons.last().unwrap().last().unwrap());
-                    assert_eq!(ends, (edge.start(), edge.end()));
+                    assert_eq!(ends, (edge.start().into(), edge.end().into()));
                     for (before, after) in polygons.iter().zip(&polygons[1..]) {
                         let [.., last, joint] = &before[..] else { panic!("{before:?}") };
                         assert_eq!(after[0], *joint);
@@ -804,8 +805,8 @@ fn along_arcs(edges: &[Edge]) -> Vec<Vector2<f64>> {
     let mut sampled = Vec::new();
     for edge in edges {
         let Edge::Curve { arcs, .. } = edge else { continue };
-        assert_eq!(arcs[0].point, edge.start());
-        let ends = arcs.iter().skip(1).map(|arc| arc.point).chain([edge.end()]);
+        assert_eq!(arcs[0].point, Point2::from(edge.start()));
+        let ends = arcs.iter().skip(1).map(|arc| arc.point).chain([edge.end().into()]);
         for (arc, end) in arcs.iter().zip(ends) {
             let chord = end - arc.point;
             let to_right = Vector2::new(chord.y, -chord.x);
@@ -831,7 +832,7 @@ fn along_arcs(edges: &[Edge]) -> Vec<Vector2<f64>> {
 fn arcs_stay_within_chord_tolerance() {
     for p in [PAPER_5_1, PAPER_5_2, PAPER_5_2_BORED, eccentric(), three_lobes()] {
         for tolerance_mm in [0.1, 1e-2, 1e-3, 1e-5] {
-            let ring = drawn(&p, Subject::Part(Part::Ring), &parts(NONE), tolerance_mm, 0.0).remove(0);
+            let ring = drawn(&p, DrawnPart::Ring, &parts(NONE), tolerance_mm, 0.0).remove(0);
             let edges = edges(&ring.holes[0]);
             let of_space = edges.len() / usize::try_from(p.ring_teeth).unwrap();
             for point in along_arcs(&edges[..of_space]) {
@@ -840,7 +841,7 @@ fn arcs_stay_within_chord_tolerance() {
                 assert!(off_mm < tolerance_mm, "{off_mm} of {tolerance_mm} on {p:?}");
             }
             if let WaveGenerator::Ellipse { semi_major_mm: a, semi_minor_mm: b } = p.wave_generator {
-                let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts(NONE), tolerance_mm, 0.0).remove(0);
+                let cam = drawn(&p, DrawnPart::WaveGenerator, &parts(NONE), tolerance_mm, 0.0).remove(0);
                 for point in along_arcs(self::edges(&cam.outer)) {
                     let slope = 2.0 * (point.x / (a * a)).hypot(point.y / (b * b));
                     let off_mm = ((point.x / a).powi(2) + (point.y / b).powi(2) - 1.0).abs() / slope;
@@ -857,8 +858,19 @@ fn eccentric_is_circle_about_its_own_centre() {
     for clearance_um in [0.0, 30.0] {
         let p = eccentric();
         let parts = PartsParameters { wave_generator_clearance_um: clearance_um, ..PartsParameters::default() };
-        let cam = drawn(&p, Subject::Part(Part::WaveGenerator), &parts, 1e-3, 0.0).remove(0);
-        let expected = Outline::Circle { center: Point2::new(e, 0.0), radius_mm: r - 1e-3 * clearance_um };
-        assert_eq!(cam.outer, expected);
+        let cam = drawn(&p, DrawnPart::WaveGenerator, &parts, 1e-3, 0.0).remove(0);
+        let [
+            upper @ Edge::Arc { center_mm, radius_mm, sweep_deg, .. },
+            lower @ Edge::Arc {
+                center_mm: other_center_mm, radius_mm: other_radius_mm, sweep_deg: other_sweep_deg, ..
+            },
+        ] = edges(&cam.outer)
+        else {
+            panic!("{:?}", cam.outer)
+        };
+        let expected = ([e, 0.0], r - 1e-3 * clearance_um, 180.0);
+        assert_eq!((*center_mm, *radius_mm, *sweep_deg), expected);
+        assert_eq!((*other_center_mm, *other_radius_mm, *other_sweep_deg), expected);
+        assert_eq!((upper.start(), lower.start()), ([e + expected.1, 0.0], [e - expected.1, 0.0]));
     }
 }

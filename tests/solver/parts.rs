@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Point2, Rotation2};
-use toothwave_solver::drawing::{Drawing, DrawingParameters, Edge, Outline, Subject, widest_finger};
+use nalgebra::{Point2, Rotation2, Vector2};
+use toothwave_solver::drawing::{Drawing, DrawingParameters, Edge, Outline, widest_finger};
 use toothwave_solver::drive::Draft;
 use toothwave_solver::findings;
 use toothwave_solver::parts::{CarrierRadii, PartsParameters};
@@ -13,19 +13,19 @@ use toothwave_solver::{
     ToothShape, WaveGenerator,
 };
 
-use crate::drives::{PAPER_5_1, PAPER_5_2, drive, ellipse};
+use crate::drives::{PAPER_5_1, PAPER_5_2, drawn_part, drive, ellipse};
 
 /// Returns the first closed path of a part's section.
 fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> Vec<Edge> {
     let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
     let draft = Draft::new(parameters).unwrap();
-    let drawing = Drawing::new(&draft, Subject::Part(part), parts, &drawing).unwrap();
+    let drawing = Drawing::new(&draft, drawn_part(part), parts, &drawing).unwrap();
     let body = drawing.bodies(&Never).unwrap().remove(0);
     let outlines = std::iter::once(body.outer).chain(body.holes);
     outlines
         .into_iter()
         .find_map(|outline| match outline {
-            Outline::Edges(edges) => Some(edges),
+            Outline::Path { edges } => Some(edges),
             Outline::Circle { .. } => None,
         })
         .unwrap()
@@ -35,7 +35,7 @@ fn edges(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> V
 fn findings_as_made(parameters: &DriveParameters, part: Part, parts: &PartsParameters) -> Vec<Finding> {
     let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points: 1_000_000, input_angle_deg: 0.0 };
     let draft = Draft::new(parameters).unwrap();
-    Drawing::new(&draft, Subject::Part(part), parts, &drawing).unwrap().findings().unwrap()
+    Drawing::new(&draft, drawn_part(part), parts, &drawing).unwrap().findings().unwrap()
 }
 
 /// Returns where a wall of slot 0 meets a circle, and the mirror image at the wall of slot 1.
@@ -89,10 +89,11 @@ fn tooth_presses_carrier_edge_outside_annulus() {
 fn pointed_finger_ends_where_slot_walls_meet() {
     let p = DriveParameters { tooth_radius_mm: 7.0, ..PAPER_5_1 };
     let finger = edges(&p, Part::Carrier, &PartsParameters::default());
-    let [Edge::Line { start: apex, end: outer }, Edge::Arc { .. }, Edge::Line { end: closed, .. }] = &finger[..] else {
+    let [to_rim @ Edge::Line { .. }, Edge::Arc { .. }, to_apex @ Edge::Line { .. }] = &finger[..] else {
         panic!("{finger:?}")
     };
-    assert_eq!(apex, closed);
+    let [apex, outer] = [to_rim.start(), to_rim.end()].map(Point2::from);
+    assert_eq!(to_apex.end(), to_rim.start());
     // On the wall of slot 0, and equally far from the middle of slot 1.
     assert!((apex.y - 7.0).abs() < 1e-12 && (outer.y - 7.0).abs() < 1e-12);
     let from_next = Rotation2::new(-2.0 * PI / 28.0) * apex;
@@ -111,11 +112,13 @@ fn wave_generator_curves_join_and_end_radially() {
         let p = DriveParameters { wave_generator, ring_teeth, ..PAPER_5_1 };
         let outline = edges(&p, Part::WaveGenerator, &PartsParameters::default());
         for (edge, next) in outline.iter().zip(outline.iter().cycle().skip(1)) {
-            let Edge::Curve { start_tangent, end_tangent, .. } = edge else { panic!("{edge:?}") };
-            for (point, tangent) in [(edge.start(), start_tangent), (edge.end(), end_tangent)] {
+            let Edge::Curve { start_tangent_deg, end_tangent_deg, .. } = edge else { panic!("{edge:?}") };
+            for (point, tangent_deg) in [(edge.start(), start_tangent_deg), (edge.end(), end_tangent_deg)] {
                 // Counter-clockwise.
+                let point = Point2::from(point);
                 let ahead = Rotation2::new(0.5 * PI) * (point.coords / point.coords.norm());
-                assert!((ahead - tangent.into_inner()).norm() < 1e-14, "{tangent:?} at {point}");
+                let tangent = Rotation2::new(tangent_deg.to_radians()) * Vector2::x();
+                assert!((ahead - tangent).norm() < 1e-14, "{tangent:?} at {point}");
             }
             assert_eq!(edge.end(), next.start());
         }
@@ -170,7 +173,7 @@ fn greatest_cam_clearance_is_least_radius() {
 #[test]
 fn widest_finger_fills_annulus_between_slots() {
     let finger = widest_finger(&drive(&PAPER_5_1)).unwrap();
-    let corners: Vec<_> = finger.iter().map(Edge::start).collect();
+    let corners: Vec<_> = finger.iter().map(|edge| Point2::from(edge.start())).collect();
     let ([inner, inner_next], [outer, outer_next]) = (on_both_walls(58.0, 5.0, 28), on_both_walls(66.0, 5.0, 28));
     assert_eq!(corners.len(), 4);
     for (found, expected) in corners.into_iter().zip([inner, outer, outer_next, inner_next]) {
@@ -191,13 +194,13 @@ fn flat_sided_tooth_is_two_arcs_and_flats() {
     // Radius 5 with flats of length 6: corners at (±3, ±4).
     let corners = [(3.0, -4.0), (3.0, 4.0), (-3.0, 4.0), (-3.0, -4.0)].map(|(x, y)| Point2::new(x, y));
     for (i, edge) in [right, upper, left, lower].into_iter().enumerate() {
-        assert!((edge.start() - corners[i]).norm() < 1e-14 * 5.0, "{edge:?}");
-        assert!((edge.end() - corners[(i + 1) % 4]).norm() < 1e-14 * 5.0, "{edge:?}");
+        assert!((Point2::from(edge.start()) - corners[i]).norm() < 1e-14 * 5.0, "{edge:?}");
+        assert!((Point2::from(edge.end()) - corners[(i + 1) % 4]).norm() < 1e-14 * 5.0, "{edge:?}");
     }
     for arc in [right, left] {
-        let &Edge::Arc { radius_mm, sweep_rad, .. } = arc else { panic!("{arc:?}") };
+        let &Edge::Arc { radius_mm, sweep_deg, .. } = arc else { panic!("{arc:?}") };
         assert_eq!(radius_mm, 5.0);
-        assert!((sweep_rad - 2.0 * 4_f64.atan2(3.0)).abs() < 1e-14, "{sweep_rad}");
+        assert!((sweep_deg.to_radians() - 2.0 * 4_f64.atan2(3.0)).abs() < 1e-14, "{sweep_deg}");
     }
 }
 
@@ -213,8 +216,8 @@ fn clearance_undercuts_ring_by_offset_from_path() {
     let tip_mm = |clearance_um| {
         let parts = PartsParameters { ring_clearance_um: clearance_um, ..PartsParameters::default() };
         let ring = edges(&p, Part::Ring, &parts);
-        let Edge::Curve { points, .. } = &ring[0] else { panic!("{ring:?}") };
-        points[0].coords.norm() - (b + 2.0 * r + 1e-3 * clearance_um)
+        let tip = Point2::from(ring[0].start());
+        tip.coords.norm() - (b + 2.0 * r + 1e-3 * clearance_um)
     };
     // A regular tip stands at b + 2r + c; the flanks of an undercut one meet farther out.
     assert!(tip_mm(0.5 * most_um).abs() < 1e-10);
@@ -322,14 +325,14 @@ fn tooth_leaves_slot_with_short_walls() {
 fn outline_with_one_chord_too_many_is_refused() {
     for (parameters, part) in [(PAPER_5_1, Part::Ring), (PAPER_5_2, Part::Ring), (PAPER_5_1, Part::WaveGenerator)] {
         let chords = |edge: &Edge| match edge {
-            Edge::Curve { points, .. } => points.len() as u64 - 1,
+            Edge::Curve { x_mm, .. } => x_mm.len() as u64 - 1,
             Edge::Line { .. } | Edge::Arc { .. } => 0,
         };
         let count: u64 = edges(&parameters, part, &PartsParameters::default()).iter().map(chords).sum();
         let of_most = |max_points| {
             let drawing = DrawingParameters { chord_tolerance_mm: 1e-3, max_points, input_angle_deg: 0.0 };
             let draft = Draft::new(&parameters).unwrap();
-            Drawing::new(&draft, Subject::Part(part), &PartsParameters::default(), &drawing).unwrap().bodies(&Never)
+            Drawing::new(&draft, drawn_part(part), &PartsParameters::default(), &drawing).unwrap().bodies(&Never)
         };
         assert!(of_most(count).is_ok(), "{count} chords of {part:?}");
         let refused = of_most(count - 1).unwrap_err();

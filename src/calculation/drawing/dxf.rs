@@ -8,8 +8,9 @@ use std::fmt::Display;
 use std::io::{self, Write};
 
 use toothwave_solver::Part;
+use toothwave_solver::drawing::{Edge, Outline, Placement};
 
-use super::answer::{DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use super::DrawingAnswer;
 use super::svg;
 
 /// Everything before and after the entities.
@@ -68,6 +69,21 @@ fn start(drawing: &DrawingAnswer) -> String {
         .replace("{layers}", &records.collect::<String>())
 }
 
+/// Returns centre and radius if the outline is a circle: around the origin, or a path of arcs about one centre.
+fn circle(outline: &Outline) -> Option<([f64; 2], f64)> {
+    match outline {
+        Outline::Circle { radius_mm } => Some(([0.0; 2], *radius_mm)),
+        Outline::Path { edges } => {
+            let mut circles = edges.iter().map(|edge| match edge {
+                Edge::Arc { center_mm, radius_mm, .. } => Some((*center_mm, *radius_mm)),
+                Edge::Line { .. } | Edge::Curve { .. } => None,
+            });
+            let first = circles.next()??;
+            circles.all(|circle| circle == Some(first)).then_some(first)
+        }
+    }
+}
+
 /// Writer of the file: pairs of a group code and a value.
 struct Dxf<'a> {
     writer: &'a mut dyn Write,
@@ -116,35 +132,35 @@ impl Dxf<'_> {
         Ok(())
     }
 
-    fn outline(&mut self, outline: &OutlineAnswer, placement: &PlacementAnswer, layer: &str) -> io::Result<()> {
+    fn outline(&mut self, outline: &Outline, placement: &Placement, layer: &str) -> io::Result<()> {
         let place = placement.placing();
-        if let Some((center_mm, radius_mm)) = outline.circle() {
+        if let Some((center_mm, radius_mm)) = circle(outline) {
             self.entity("CIRCLE", "AcDbCircle", layer)?;
             self.point(10, place(center_mm))?;
             self.number(30, 0.0)?;
             return self.number(40, radius_mm);
         }
-        let OutlineAnswer::Path { edges } = outline else { return Ok(()) };
+        let Outline::Path { edges } = outline else { return Ok(()) };
         self.entity("LWPOLYLINE", "AcDbPolyline", layer)?;
         // The last point of an edge is the first of the next one.
-        let vertex_count = |edge: &EdgeAnswer| match edge {
-            EdgeAnswer::Line { .. } | EdgeAnswer::Arc { .. } => 1,
-            EdgeAnswer::Curve { arcs, .. } => arcs.len(),
+        let vertex_count = |edge: &Edge| match edge {
+            Edge::Line { .. } | Edge::Arc { .. } => 1,
+            Edge::Curve { arcs, .. } => arcs.len(),
         };
         self.text(90, edges.iter().map(vertex_count).sum::<usize>())?;
         self.text(70, 1)?; // closed
         for edge in edges {
             match edge {
-                EdgeAnswer::Line { .. } => self.point(10, place(edge.start()))?,
-                EdgeAnswer::Arc { sweep_deg, .. } => {
+                Edge::Line { .. } => self.point(10, place(edge.start()))?,
+                Edge::Arc { sweep_deg, .. } => {
                     self.point(10, place(edge.start()))?;
                     // The bulge of a polyline is the tangent of a quarter of its arc's angle.
                     self.number(42, (0.25 * sweep_deg.to_radians()).tan())?;
                 }
-                EdgeAnswer::Curve { arcs, .. } => {
-                    for &[x, y, bulge] in arcs {
-                        self.point(10, place([x, y]))?;
-                        self.number(42, bulge)?;
+                Edge::Curve { arcs, .. } => {
+                    for arc in arcs {
+                        self.point(10, place(arc.point.into()))?;
+                        self.number(42, arc.bulge)?;
                     }
                 }
             }

@@ -8,8 +8,9 @@
 use std::f64::consts::PI;
 
 use toothwave_solver::Part;
+use toothwave_solver::drawing::{Body, BodySolid, Edge, Outline};
 
-use super::answer::{BodyAnswer, BodySolid, DrawingAnswer, EdgeAnswer, OutlineAnswer};
+use super::DrawingAnswer;
 
 /// Largest number of chords of a circle. On a radius of 1 m they are within 1 nm of it.
 const MOST_CHORDS: u32 = 100_000;
@@ -33,18 +34,18 @@ pub(super) fn held_bytes(drawing: &DrawingAnswer) -> u64 {
     const POINT_BYTES: u64 = 320;
     const BALL_BYTES: u64 = 6 << 20;
     let tolerance_mm = drawing.chord_tolerance_mm;
-    let of_edge = |edge: &EdgeAnswer| match edge {
-        EdgeAnswer::Line { .. } => 1,
-        EdgeAnswer::Arc { radius_mm, sweep_deg, .. } => {
+    let of_edge = |edge: &Edge| match edge {
+        Edge::Line { .. } => 1,
+        Edge::Arc { radius_mm, sweep_deg, .. } => {
             chords(sweep_deg.to_radians(), *radius_mm, tolerance_mm, MOST_CHORDS).into()
         }
-        EdgeAnswer::Curve { x_mm, .. } => x_mm.len() as u64,
+        Edge::Curve { x_mm, .. } => x_mm.len() as u64,
     };
-    let of_outline = |outline: &OutlineAnswer| match outline {
-        OutlineAnswer::Circle { radius_mm } => chords(2.0 * PI, *radius_mm, tolerance_mm, MOST_CHORDS).into(),
-        OutlineAnswer::Path { edges } => edges.iter().map(of_edge).sum::<u64>(),
+    let of_outline = |outline: &Outline| match outline {
+        Outline::Circle { radius_mm } => chords(2.0 * PI, *radius_mm, tolerance_mm, MOST_CHORDS).into(),
+        Outline::Path { edges } => edges.iter().map(of_edge).sum::<u64>(),
     };
-    let of_body = |body: &BodyAnswer| match body.solid {
+    let of_body = |body: &Body| match body.solid {
         BodySolid::Ball => BALL_BYTES,
         BodySolid::Prism => POINT_BYTES * body.holes.iter().chain([&body.outer]).map(of_outline).sum::<u64>(),
     };
@@ -61,9 +62,9 @@ struct Ladder {
 
 impl Mesh {
     /// Divides the section of a body, at its original position, within the chord tolerance.
-    pub(super) fn new(body: &BodyAnswer, tolerance_mm: f64) -> Self {
+    pub(super) fn new(body: &Body, tolerance_mm: f64) -> Self {
         match (body.solid, &body.outer) {
-            (BodySolid::Ball, OutlineAnswer::Circle { radius_mm }) => {
+            (BodySolid::Ball, Outline::Circle { radius_mm }) => {
                 Self::ball(*radius_mm, 0.5 * body.width_mm, tolerance_mm)
             }
             _ => Self::prism(&Ladder::new(body, tolerance_mm), body.width_mm),
@@ -137,14 +138,12 @@ impl Mesh {
 }
 
 impl Ladder {
-    fn new(body: &BodyAnswer, tolerance_mm: f64) -> Self {
-        let line = |outline: &OutlineAnswer| line(outline, tolerance_mm);
+    fn new(body: &Body, tolerance_mm: f64) -> Self {
+        let line = |outline: &Outline| line(outline, tolerance_mm);
         match (body.part, &body.outer, &body.holes[..]) {
-            (Part::Carrier, OutlineAnswer::Path { edges }, _) => Self::finger(edges, tolerance_mm),
-            (_, OutlineAnswer::Circle { radius_mm }, [hole]) => Self::to_circle(&line(hole), *radius_mm, tolerance_mm),
-            (_, outer, [OutlineAnswer::Circle { radius_mm }]) => {
-                Self::to_circle(&line(outer), *radius_mm, tolerance_mm)
-            }
+            (Part::Carrier, Outline::Path { edges }, _) => Self::finger(edges, tolerance_mm),
+            (_, Outline::Circle { radius_mm }, [hole]) => Self::to_circle(&line(hole), *radius_mm, tolerance_mm),
+            (_, outer, [Outline::Circle { radius_mm }]) => Self::to_circle(&line(outer), *radius_mm, tolerance_mm),
             (_, outer, _) => Self::around_origin(&line(outer)),
         }
     }
@@ -180,10 +179,10 @@ impl Ladder {
     }
 
     /// Fills a finger of the carrier: between its outer arc and its inner one, which runs the other way, or its point.
-    fn finger(edges: &[EdgeAnswer], tolerance_mm: f64) -> Self {
+    fn finger(edges: &[Edge], tolerance_mm: f64) -> Self {
         let mut arcs = edges.iter().filter_map(|edge| match edge {
-            EdgeAnswer::Arc { radius_mm, sweep_deg, .. } => Some((edge.start(), *radius_mm, sweep_deg.to_radians())),
-            EdgeAnswer::Line { .. } | EdgeAnswer::Curve { .. } => None,
+            Edge::Arc { radius_mm, sweep_deg, .. } => Some((edge.start(), *radius_mm, sweep_deg.to_radians())),
+            Edge::Line { .. } | Edge::Curve { .. } => None,
         });
         let mut ladder = Self::default();
         let (Some((start, radius_mm, sweep_rad)), inner) = (arcs.next(), arcs.next()) else { return ladder };
@@ -214,7 +213,7 @@ impl Ladder {
 }
 
 /// Returns the points of a closed outline, each once.
-fn line(outline: &OutlineAnswer, tolerance_mm: f64) -> Vec<[f64; 2]> {
+fn line(outline: &Outline, tolerance_mm: f64) -> Vec<[f64; 2]> {
     let arc = |[x, y]: [f64; 2], [center_x, center_y]: [f64; 2], radius_mm: f64, sweep_rad: f64| {
         let chords = chords(sweep_rad, radius_mm, tolerance_mm, MOST_CHORDS);
         (0..chords).map(move |chord| {
@@ -224,16 +223,14 @@ fn line(outline: &OutlineAnswer, tolerance_mm: f64) -> Vec<[f64; 2]> {
         })
     };
     let points: Vec<_> = match outline {
-        OutlineAnswer::Circle { radius_mm } => arc([*radius_mm, 0.0], [0.0; 2], *radius_mm, 2.0 * PI).collect(),
-        OutlineAnswer::Path { edges } => edges
+        Outline::Circle { radius_mm } => arc([*radius_mm, 0.0], [0.0; 2], *radius_mm, 2.0 * PI).collect(),
+        Outline::Path { edges } => edges
             .iter()
             .flat_map(|edge| match edge {
-                EdgeAnswer::Arc { center_mm, radius_mm, sweep_deg, .. } => {
+                Edge::Arc { center_mm, radius_mm, sweep_deg, .. } => {
                     arc(edge.start(), *center_mm, *radius_mm, sweep_deg.to_radians()).collect::<Vec<_>>()
                 }
-                EdgeAnswer::Line { .. } | EdgeAnswer::Curve { .. } => {
-                    edge.points().take(edge.points().len() - 1).collect()
-                }
+                Edge::Line { .. } | Edge::Curve { .. } => edge.points().take(edge.points().len() - 1).collect(),
             })
             .collect(),
     };

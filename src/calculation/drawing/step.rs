@@ -9,8 +9,10 @@ use std::collections::HashMap;
 use std::io::{self, Write};
 
 use toothwave_solver::Part;
+use toothwave_solver::drawing::{Body, BodySolid, Edge, Outline, Placement};
+use toothwave_solver::profile::Polyline;
 
-use super::answer::{BodyAnswer, BodySolid, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use super::DrawingAnswer;
 use super::svg;
 use crate::json;
 
@@ -26,7 +28,7 @@ pub(super) fn write(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Resu
     for body in &drawing.bodies {
         components.push((body, step.part(body, hash, origin)?));
     }
-    let stands_alone = matches!(&drawing.bodies[..], [body] if body.placements[..] == [PlacementAnswer::default()]);
+    let stands_alone = matches!(&drawing.bodies[..], [body] if body.placements[..] == [Placement::default()]);
     if !stands_alone {
         step.assembly(&format!("{} {hash}", json::word(&drawing.subject)), &components, origin)?;
     }
@@ -131,7 +133,7 @@ impl Step<'_> {
     }
 
     /// Writes a part once, at its original position.
-    fn part(&mut self, body: &BodyAnswer, hash: &str, origin: Id) -> io::Result<Product> {
+    fn part(&mut self, body: &Body, hash: &str, origin: Id) -> io::Result<Product> {
         let (name, [red, green, blue]) = match body.part {
             Part::WaveGenerator => ("wave_generator", [0.33, 0.62, 0.84]),
             Part::Teeth => ("tooth", [0.94, 0.95, 0.96]),
@@ -140,9 +142,7 @@ impl Step<'_> {
         };
         let name = format!("{name} {hash}");
         let solid = match (body.solid, &body.outer) {
-            (BodySolid::Ball, OutlineAnswer::Circle { radius_mm }) => {
-                self.ball(*radius_mm, 0.5 * body.width_mm, &name)?
-            }
+            (BodySolid::Ball, Outline::Circle { radius_mm }) => self.ball(*radius_mm, 0.5 * body.width_mm, &name)?,
             _ => self.prism(body, &name)?,
         };
         let representation =
@@ -172,11 +172,11 @@ impl Step<'_> {
     }
 
     /// Writes the placed parts, with one instance for each placement.
-    fn assembly(&mut self, name: &str, components: &[(&BodyAnswer, Product)], origin: Id) -> io::Result<()> {
+    fn assembly(&mut self, name: &str, components: &[(&Body, Product)], origin: Id) -> io::Result<()> {
         let mut places = Vec::new();
         for (body, _) in components {
             let mut of_body = Vec::new();
-            for PlacementAnswer { x_mm, y_mm, rotation_deg } in &body.placements {
+            for Placement { x_mm, y_mm, rotation_deg } in &body.placements {
                 let (sin, cos) = rotation_deg.to_radians().sin_cos();
                 of_body.push(self.placement([*x_mm, *y_mm, 0.0], [0.0, 0.0, 1.0], [cos, sin, 0.0])?);
             }
@@ -206,7 +206,7 @@ impl Step<'_> {
     }
 
     /// Writes a prism from z = 0 upward: a face on every edge, a bottom and a top.
-    fn prism(&mut self, body: &BodyAnswer, name: &str) -> io::Result<Id> {
+    fn prism(&mut self, body: &Body, name: &str) -> io::Result<Id> {
         let outer = (sides(&body.outer, false), "FACE_OUTER_BOUND");
         let holes = body.holes.iter().map(|hole| (sides(hole, true), "FACE_BOUND"));
         let (mut faces, mut bottom_bounds, mut top_bounds) = (Vec::new(), Vec::new(), Vec::new());
@@ -385,29 +385,32 @@ impl Step<'_> {
 }
 
 /// Returns the sides of a prism over an outline. Those of a hole run clockwise, so the material is on their left too.
-fn sides(outline: &OutlineAnswer, is_hole: bool) -> Vec<Side> {
+fn sides(outline: &Outline, is_hole: bool) -> Vec<Side> {
     let arc = |center, radius_mm, runs_forward| {
         let is_counter_clockwise = runs_forward != is_hole;
         Shape::Arc { center, radius_mm, is_counter_clockwise }
     };
-    let curve = |poles: &Vec<[f64; 2]>| {
-        let poles = if is_hole { poles.iter().rev().copied().collect() } else { poles.clone() };
+    let curve = |poles: &Polyline| {
+        let mut poles: Vec<[f64; 2]> = poles.iter().map(|&pole| pole.into()).collect();
+        if is_hole {
+            poles.reverse();
+        }
         (poles.last().copied().unwrap_or_default(), Shape::Curve(poles))
     };
     let shapes: Vec<([f64; 2], Shape)> = match outline {
         // Two halves, because some readers do not support an edge from a corner to itself. A hole has the same halves.
-        OutlineAnswer::Circle { radius_mm } => {
+        Outline::Circle { radius_mm } => {
             [-radius_mm, *radius_mm].map(|x| ([x, 0.0], arc([0.0; 2], *radius_mm, true))).into()
         }
-        OutlineAnswer::Path { edges } => {
+        Outline::Path { edges } => {
             let shapes = edges.iter().flat_map(|edge| {
                 let end = if is_hole { edge.start() } else { edge.end() };
                 match edge {
-                    EdgeAnswer::Line { .. } => vec![(end, Shape::Line)],
-                    EdgeAnswer::Arc { center_mm, radius_mm, sweep_deg, .. } => {
+                    Edge::Line { .. } => vec![(end, Shape::Line)],
+                    Edge::Arc { center_mm, radius_mm, sweep_deg, .. } => {
                         vec![(end, arc(*center_mm, *radius_mm, *sweep_deg > 0.0))]
                     }
-                    EdgeAnswer::Curve { polynomials, .. } => polynomials.iter().map(curve).collect(),
+                    Edge::Curve { polynomials, .. } => polynomials.iter().map(curve).collect(),
                 }
             });
             if is_hole { shapes.rev().collect() } else { shapes.collect() }

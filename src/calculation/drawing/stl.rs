@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::answer::DrawingAnswer;
+use super::DrawingAnswer;
 use super::mesh::Mesh;
 use super::svg;
 

@@ -3,8 +3,9 @@
 use std::io::{self, Write};
 
 use toothwave_solver::Part;
+use toothwave_solver::drawing::{Body, Edge, Outline, Placement};
 
-use super::answer::{BodyAnswer, DrawingAnswer, EdgeAnswer, OutlineAnswer, PlacementAnswer};
+use super::DrawingAnswer;
 
 /// Margin around the drawing, as a share of the picture.
 const MARGIN: f64 = 0.03;
@@ -49,32 +50,30 @@ pub(super) fn title(drawing: &DrawingAnswer) -> String {
 }
 
 /// Returns the largest distance of a drawing's points from its origin.
-pub(super) fn reach_mm(bodies: &[BodyAnswer]) -> f64 {
-    let of_edge = |edge: &EdgeAnswer| match edge {
-        EdgeAnswer::Arc { center_mm: [x, y], radius_mm, .. } => x.hypot(*y) + radius_mm,
-        EdgeAnswer::Line { .. } | EdgeAnswer::Curve { .. } => {
-            edge.points().map(|[x, y]| x.hypot(y)).fold(0.0, f64::max)
-        }
+pub(super) fn reach_mm(bodies: &[Body]) -> f64 {
+    let of_edge = |edge: &Edge| match edge {
+        Edge::Arc { center_mm: [x, y], radius_mm, .. } => x.hypot(*y) + radius_mm,
+        Edge::Line { .. } | Edge::Curve { .. } => edge.points().map(|[x, y]| x.hypot(y)).fold(0.0, f64::max),
     };
-    let of_body = |body: &BodyAnswer| {
+    let of_body = |body: &Body| {
         let outline_mm = match &body.outer {
-            OutlineAnswer::Circle { radius_mm } => *radius_mm,
-            OutlineAnswer::Path { edges } => edges.iter().map(of_edge).fold(0.0, f64::max),
+            Outline::Circle { radius_mm } => *radius_mm,
+            Outline::Path { edges } => edges.iter().map(of_edge).fold(0.0, f64::max),
         };
         body.placements.iter().map(|placement| placement.x_mm.hypot(placement.y_mm) + outline_mm).fold(0.0, f64::max)
     };
     bodies.iter().map(of_body).fold(0.0, f64::max)
 }
 
-fn write_outline(outline: &OutlineAnswer, placement: &PlacementAnswer, writer: &mut dyn Write) -> io::Result<()> {
+fn write_outline(outline: &Outline, placement: &Placement, writer: &mut dyn Write) -> io::Result<()> {
     match outline {
-        OutlineAnswer::Circle { radius_mm } => {
-            let PlacementAnswer { x_mm, y_mm, .. } = placement;
+        Outline::Circle { radius_mm } => {
+            let Placement { x_mm, y_mm, .. } = placement;
             let (left, right) = (x_mm - radius_mm, x_mm + radius_mm);
             write!(writer, "M{right} {y_mm}A{radius_mm} {radius_mm} 0 0 1 {left} {y_mm}")?;
             write!(writer, "A{radius_mm} {radius_mm} 0 0 1 {right} {y_mm}Z")
         }
-        OutlineAnswer::Path { edges } => {
+        Outline::Path { edges } => {
             let place = placement.placing();
             for (index, edge) in edges.iter().enumerate() {
                 if index == 0 {
@@ -82,13 +81,13 @@ fn write_outline(outline: &OutlineAnswer, placement: &PlacementAnswer, writer: &
                     write!(writer, "M{x} {y}")?;
                 }
                 match edge {
-                    EdgeAnswer::Arc { radius_mm, sweep_deg, .. } => {
+                    Edge::Arc { radius_mm, sweep_deg, .. } => {
                         let [x, y] = place(edge.end());
                         let (large, counter_clockwise) =
                             (u8::from(sweep_deg.abs() > 180.0), u8::from(*sweep_deg > 0.0));
                         write!(writer, "A{radius_mm} {radius_mm} 0 {large} {counter_clockwise} {x} {y}")?;
                     }
-                    EdgeAnswer::Line { .. } | EdgeAnswer::Curve { .. } => {
+                    Edge::Line { .. } | Edge::Curve { .. } => {
                         for [x, y] in edge.points().skip(1).map(&place) {
                             write!(writer, "L{x} {y}")?;
                         }

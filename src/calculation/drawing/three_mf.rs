@@ -3,10 +3,11 @@
 
 use std::io::{self, Cursor, Write};
 
+use toothwave_solver::drawing::{Body, Placement};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-use super::answer::{BodyAnswer, DrawingAnswer, PlacementAnswer};
+use super::DrawingAnswer;
 use super::mesh::Mesh;
 use super::stl::single;
 use super::svg;
@@ -49,7 +50,7 @@ fn write_model(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()
     }
     writeln!(writer, "</resources>\n<build>")?;
     for (index, body) in drawing.bodies.iter().enumerate() {
-        for PlacementAnswer { x_mm, y_mm, rotation_deg } in &body.placements {
+        for Placement { x_mm, y_mm, rotation_deg } in &body.placements {
             let (sin, cos) = rotation_deg.to_radians().sin_cos();
             let id = 1 + index;
             // The rows are the images of x, y, z and the origin.
@@ -63,7 +64,7 @@ fn write_model(drawing: &DrawingAnswer, writer: &mut dyn Write) -> io::Result<()
     writeln!(writer, "</build>\n</model>")
 }
 
-fn write_object(id: usize, body: &BodyAnswer, tolerance_mm: f64, writer: &mut dyn Write) -> io::Result<()> {
+fn write_object(id: usize, body: &Body, tolerance_mm: f64, writer: &mut dyn Write) -> io::Result<()> {
     let mesh = Mesh::new(body, tolerance_mm);
     let name = json::word(&body.part);
     writeln!(writer, r#"<object id="{id}" type="model" name="{name}"><mesh><vertices>"#)?;

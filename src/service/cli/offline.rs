@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
-use toothwave_calculation::drawing::answer::DrawnPart;
+use toothwave_calculation::drawing::DrawnPart;
 use toothwave_calculation::forms::{Format, Forms};
 use toothwave_calculation::question::{Limits, Question};
 

@@ -7,9 +7,8 @@ use axum::extract::{Path, Request, State};
 use axum::http::Uri;
 use axum::response::{IntoResponse, Response};
 use toothwave_calculation::design::Design;
-use toothwave_calculation::drawing::Drawing;
-use toothwave_calculation::drawing::answer::{DrawingAnswer, DrawnPart};
 use toothwave_calculation::drawing::preset::DrawingOptions;
+use toothwave_calculation::drawing::{Drawing, DrawingAnswer, DrawnPart};
 use toothwave_calculation::json;
 
 use crate::app::App;
