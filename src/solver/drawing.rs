@@ -17,11 +17,10 @@ pub use crate::outline::{Edge, Outline, SPLINE_SHARE_OF_CHORD};
 use crate::parts::{CarrierPart, MadePart, PartsParameters};
 use crate::profile::{
     Density, Extent, ProfileParameters, SampledCurve, cam_half_lobe, cam_half_lobes, direction, expected_points,
-    on_circle,
 };
 use crate::root::NotConverged;
 use crate::spline;
-use crate::tooth_space::{HalfSpace, ToothSpace};
+use crate::tooth_space::ToothSpace;
 use crate::violation::Parameter;
 use crate::{SolveError, Stop};
 
@@ -256,25 +255,14 @@ impl Drawing {
     /// Returns the edges of the ring's tooth spaces, from tip to tip. Bored or rotated flanks leave lands between these.
     fn ring_edges(&self, made: &ToothSpace, stop: &dyn Stop) -> Result<Vec<Edge>, SolveError> {
         let teeth = self.drive.parameters().ring_teeth.unsigned_abs();
-        let mut half = made.half(self.density(), stop)?;
-        let chords: usize = half.pieces.iter().map(|piece| chords(&piece.points)).sum();
-        self.require_points(2 * chords as u64 * teeth)?;
-        let tip_rad = PI / teeth as f64;
-        let tip = made.tip();
-        if !tip.has_land
-            && let Some(end) = half.pieces.last_mut().and_then(|piece| piece.points.last_mut())
-        {
-            // Both flanks end on the symmetry line, where the tip is a point or smooth.
-            *end = on_circle(tip.radius_mm, tip_rad);
-        }
-        let land_rad = match half.pieces.last().and_then(|piece| piece.points.last()) {
-            Some(end) if tip.has_land => 2.0 * (tip_rad - end.y.atan2(end.x)),
-            _ => 0.0,
-        };
-        let root_arc_rad = half.root_arc_rad;
+        let (tip, tip_rad) = (made.tip, PI / teeth as f64);
+        let flanks = made.flanks(tip_rad, self.density(), stop)?;
+        let chords: usize = flanks.iter().map(|flank| chords(&flank.points)).sum();
+        self.require_points(chords as u64 * teeth)?;
         let curve = |flank: &SampledCurve| Curve::new(flank, self.parameters.chord_tolerance_mm);
-        let flanks: Vec<_> = flanks(half).iter().map(curve).collect();
-        let (start, root) = (flanks[0].points[0], flanks[flanks.len() / 2].points[0]);
+        let flanks: Vec<_> = flanks.iter().map(curve).collect();
+        let (first, middle, last) = (&flanks[0], &flanks[flanks.len() / 2], &flanks[flanks.len() - 1]);
+        let (start, root, end) = (first.points[0], middle.points[0], last.points[last.points.len() - 1]);
         let turned = |copy: u64| Rotation2::new(2.0 * PI * ((copy % teeth) as f64 / teeth as f64));
         let mut edges: Vec<Edge> = Vec::new();
         let end_of = |edges: &[Edge]| Point2::from(edges.last().map(Edge::end).unwrap_or_default());
@@ -282,9 +270,9 @@ impl Drawing {
             let next = turned(copy + 1) * start;
             for (index, flank) in flanks.iter().enumerate() {
                 let mut flank = flank.turned(&turned(copy));
-                if root_arc_rad > 0.0 && index == flanks.len() / 2 {
-                    let root_radius_mm = root.coords.norm();
-                    edges.push(Edge::arc(end_of(&edges), flank.points[0], root_radius_mm, 2.0 * root_arc_rad));
+                if made.root_arc_rad() > 0.0 && index == flanks.len() / 2 {
+                    let (radius_mm, sweep_rad) = (root.coords.norm(), 2.0 * made.root_arc_rad());
+                    edges.push(Edge::arc(end_of(&edges), flank.points[0], radius_mm, sweep_rad));
                 }
                 if !tip.has_land && index + 1 == flanks.len() {
                     flank.end_at(next);
@@ -292,6 +280,7 @@ impl Drawing {
                 edges.push(flank.into());
             }
             if tip.has_land {
+                let land_rad = 2.0 * (tip_rad - end.y.atan2(end.x));
                 edges.push(Edge::arc(end_of(&edges), next, tip.radius_mm, land_rad));
             }
         }
@@ -404,33 +393,6 @@ impl Drawing {
         let limit = self.parameters.max_points;
         if points > limit { Err(SolveError::TooManyPoints { points, limit }) } else { Ok(()) }
     }
-}
-
-/// Returns the flanks of a tooth space from tip to tip. They are one curve if they are smooth at the root.
-fn flanks(half: HalfSpace) -> Vec<SampledCurve> {
-    let HalfSpace { root_arc_rad, is_smooth_at_root, mut pieces } = half;
-    if let Some(first) = pieces.first_mut().and_then(|piece| piece.points.first_mut())
-        && root_arc_rad == 0.0
-    {
-        // Both flanks start on the middle of the space.
-        *first = Point2::new(first.coords.norm(), 0.0);
-    }
-    let image = |point: &Point2<f64>| Point2::new(point.x, 0.0 - point.y);
-    let image_tangent = |tangent: &Unit<Vector2<f64>>| Unit::new_unchecked(Vector2::new(-tangent.x, tangent.y));
-    let mirrored = |curve: &SampledCurve| SampledCurve {
-        points: curve.points.iter().rev().map(image).collect(),
-        tangents: curve.tangents.iter().rev().map(image_tangent).collect(),
-    };
-    let mut curves: Vec<_> = pieces.iter().rev().map(mirrored).collect();
-    let mut pieces = pieces.into_iter();
-    if is_smooth_at_root
-        && let (Some(before), Some(SampledCurve { points, tangents })) = (curves.last_mut(), pieces.next())
-    {
-        before.points.extend(&points[1..]);
-        before.tangents.extend(&tangents[1..]);
-    }
-    curves.extend(pieces);
-    curves
 }
 
 /// Returns the outline of a tooth: a circle, or two arcs joined by flats parallel to its slot, which is along x.

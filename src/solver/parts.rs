@@ -102,7 +102,7 @@ impl PartsParameters {
         if let (Some(outer_mm), Some(clearance_mm)) = (outer_mm, clearance_mm)
             && let (Some(a), Some(r)) = (draft.cam_outer_mm, draft.tooth_radius_mm)
         {
-            let as_made_mm = self.ring_space(draft).map(|space| space.outermost_radius_mm());
+            let as_made_mm = self.ring_space(draft).map(|space| space.outermost_radius_mm);
             let root_mm = as_made_mm.unwrap_or(a + (r + (r + clearance_mm)));
             let limit_mm = root_mm * (1.0 + LEAST_WALL);
             checks.require(outer_mm > limit_mm, || Violation::ring_without_rim(outer_mm, limit_mm));
@@ -153,7 +153,7 @@ impl PartsParameters {
     fn check_carrier(&self, draft: &Draft, checks: &mut Checks) {
         let clearance_mm = checks.clearance_mm(Part::Carrier, self.carrier_clearance_um);
         let set_forward_um = -self.modification.wave_generator_equidistant_um - self.wave_generator_clearance_um;
-        let tip_mm = self.ring_space(draft).map_or(f64::INFINITY, |space| space.tip().radius_mm);
+        let tip_mm = self.ring_space(draft).map_or(f64::INFINITY, |space| space.tip.radius_mm);
         let ring = draft.ring.as_ref();
         let outer_mm = checks.carrier_radii(self.carrier, draft.cam_outer_mm, ring, set_forward_um, tip_mm);
         if let (Some(clearance_mm), Some(half_width_mm)) = (clearance_mm, draft.slot_half_width_mm) {
@@ -234,7 +234,7 @@ impl MadePart {
         Ok(match part {
             Part::Ring => {
                 let space = ToothSpace::new(drive, MM_PER_UM * p.ring_clearance_um, &p.modification)?;
-                let outer_radius_mm = p.ring_outer_radius_mm.unwrap_or(RIM * space.outermost_radius_mm());
+                let outer_radius_mm = p.ring_outer_radius_mm.unwrap_or(RIM * space.outermost_radius_mm);
                 Self::Ring { space: Box::new(space), outer_radius_mm }
             }
             Part::Carrier => Self::Carrier(CarrierPart::new(drive, parameters)),

@@ -146,7 +146,7 @@ pub fn expected_points(drive: &Drive, parameters: &ProfileParameters) -> u64 {
 
 /// Returns the ring from the middle of its tooth space to its tooth's symmetry line, including the land of a bored tip.
 fn ring_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
-    let mut points = flank_curve(drive.flank(), drive.flank_limit().position, density, stop)?.points;
+    let mut points = flank_curve(drive.flank(), drive.flank_limit().position, density, stop)?;
     let tip_rad = PI / drive.parameters().ring_teeth as f64;
     match drive.flank_limit().end {
         FlankEnd::RegularTip | FlankEnd::Undercut => {
@@ -171,29 +171,16 @@ fn ring_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<P
 }
 
 /// Returns the ring's flank from the middle of its tooth space to a position.
-pub(crate) fn flank_curve(
-    flank: &RingFlank,
-    end: Position,
-    density: Density,
-    stop: &dyn Stop,
-) -> Result<SampledCurve, SolveError> {
-    let lobes = flank.locus().lobes();
-    sampled(Position::lobe(lobes), end, density, stop, |position| {
-        let tooth = flank.locus().at(position)?;
-        let point = flank.at(&tooth);
-        Ok(CurvePoint {
-            point: flank.point(&tooth, &point),
-            tangent: flank.tangent(&tooth, &point),
-            bend: flank.turning(&tooth),
-        })
-    })
+fn flank_curve(flank: &RingFlank, end: Position, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
+    let start = Position::lobe(flank.locus().lobes());
+    Ok(sampled(start, end, density, stop, |position| flank.curve_point(position))?.points)
 }
 
 /// Returns the path of a tooth's centre from the middle of the tooth space to the symmetry line of the ring's tooth.
 fn path_half_tooth(drive: &Drive, density: Density, stop: &dyn Stop) -> Result<Polyline, SolveError> {
     let (flank, p) = (drive.flank(), drive.parameters());
     let path = flank.at_distance(0.0);
-    let mut points = flank_curve(&path, Position::valley(drive.lobes()), density, stop)?.points;
+    let mut points = flank_curve(&path, Position::valley(drive.lobes()), density, stop)?;
     points.pop();
     let valley_mm = flank.locus().cam_inner_radius_mm() + p.tooth_radius_mm;
     points.push(on_circle(valley_mm, PI / p.ring_teeth as f64));

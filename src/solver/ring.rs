@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point2, Unit, Vector2};
 
-use crate::cam::{Cam, Kind, ToothCenter};
+use crate::cam::{Cam, CurvePoint, Kind, ToothCenter};
 use crate::position::{Position, half_lobe_rad};
 use crate::root::{NotConverged, bracketed};
 
@@ -283,6 +283,17 @@ impl RingFlank {
     pub fn tangent(&self, tooth: &ToothCenter, point: &FlankPoint) -> Unit<Vector2<f64>> {
         let normal_rad = tooth.position.from_lobe_rad / self.teeth_per_wave + point.tan_pressure_angle.atan();
         Unit::new_unchecked(Vector2::new(-normal_rad.sin(), normal_rad.cos()))
+    }
+
+    /// Returns the point that the tooth at a position touches, with its tangent and sign of curvature.
+    pub(crate) fn curve_point(&self, position: Position) -> Result<CurvePoint, NotConverged> {
+        let tooth = self.locus().at(position)?;
+        let point = self.at(&tooth);
+        Ok(CurvePoint {
+            point: self.point(&tooth, &point),
+            tangent: self.tangent(&tooth, &point),
+            bend: self.turning(&tooth),
+        })
     }
 
     /// Returns `d_v (1 + rκ)` at the tip, with r the flank's distance.

@@ -1,13 +1,13 @@
 //! Tooth space of the ring as made: its flank offset by a clearance and shaped by a modification
 //! (docs/explanation/theory.md section 8).
 
-use nalgebra::{Unit, Vector2};
+use nalgebra::{Point2, Unit, Vector2};
 
 use crate::cam::CurvePoint;
 use crate::drive::{Drive, DriveError};
 use crate::gaps::{MM_PER_UM, Modification, RAD_PER_ARCSEC, TipRelief};
 use crate::position::{Position, half_lobe_rad};
-use crate::profile::{Density, SampledCurve, flank_curve, on_circle, sampled};
+use crate::profile::{Density, SampledCurve, on_circle, sampled};
 use crate::ring::{FlankEnd, RingFlank, RingTooth};
 use crate::root::{NotConverged, bracketed, golden_section};
 use crate::violation::{Modified, Violation};
@@ -16,9 +16,14 @@ use crate::{SolveError, Stop};
 /// One symmetric tooth space of the ring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ToothSpace {
-    /// The flank offset by its distance from the path, and its end if nothing else shapes it.
-    set_back: RingTooth,
-    shaped: Option<ShapedSpace>,
+    flank: ShapedFlank,
+    start: Position,
+    end: Position,
+    /// Cause of the flank's end if only its distance from the path shaped it.
+    end_by_distance: FlankEnd,
+    pub(crate) tip: Tip,
+    /// Largest radius of the space: that of the root, or of a tip relief beyond it.
+    pub(crate) outermost_radius_mm: f64,
 }
 
 /// End of a space at the ring's tip.
@@ -29,27 +34,7 @@ pub(crate) struct Tip {
     pub(crate) has_land: bool,
 }
 
-/// Half a tooth space from its middle outward, the mirror image of the other half.
-pub(crate) struct HalfSpace {
-    /// Half the angle of the arc that joins rotated flanks at the root.
-    pub(crate) root_arc_rad: f64,
-    /// True if the two flanks are one smooth curve at the root.
-    pub(crate) is_smooth_at_root: bool,
-    /// The flank, in two pieces if it contains the start of a tip relief.
-    pub(crate) pieces: Vec<SampledCurve>,
-}
-
-/// A flank that is shaped by more than its distance from the path, from start to end.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct ShapedSpace {
-    flank: ShapedFlank,
-    start: Position,
-    end: Position,
-    tip: Tip,
-    outermost_radius_mm: f64,
-}
-
-/// Shape of a flank in addition to its distance.
+/// Flank with its shape in addition to its distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ShapedFlank {
     flank: RingFlank,
@@ -119,51 +104,88 @@ impl ToothSpace {
             return Err(leaves_nothing(Modified::RingEquidistant, modification.ring_equidistant_um, limit));
         }
         let flank = drive.flank().at_distance(drive.flank().distance_mm + (clearance_mm + equidistant_mm));
-        let set_back = RingTooth::new(flank, bore_mm)?;
-        let Some(shaped) = ShapedFlank::new(drive, flank, modification) else {
-            return Ok(Self { set_back, shaped: None });
-        };
-        match shaped.space(bore_mm)? {
-            Some(shaped) => Ok(Self { set_back, shaped: Some(shaped) }),
-            None => {
-                let unrelieved = ShapedFlank { relief: None, ..shaped };
-                let (modified, value) = match modification.ring_tip_relief {
-                    Some(relief) if unrelieved.space(bore_mm)?.is_some() => {
-                        (Modified::TipReliefAmount, relief.amount_um)
-                    }
-                    _ => modification.greatest_of_ring(),
-                };
-                Err(leaves_nothing(modified, value, None))
-            }
+        let RingTooth { limit, tip_radius_mm, .. } = RingTooth::new(flank, bore_mm)?;
+        let shaped = ShapedFlank::new(drive, flank, modification);
+        if !shaped.is_shaped() {
+            return Ok(Self {
+                flank: shaped,
+                start: Position::lobe(drive.lobes()),
+                end: limit.position,
+                end_by_distance: limit.end,
+                tip: Tip { radius_mm: tip_radius_mm, has_land: limit.end == FlankEnd::Bore },
+                outermost_radius_mm: flank.root_radius_mm(),
+            });
         }
+        if let Some(space) = shaped.space(limit.end, bore_mm)? {
+            return Ok(space);
+        }
+        let unrelieved = ShapedFlank { relief: None, ..shaped };
+        let (modified, value) = match modification.ring_tip_relief {
+            Some(relief) if unrelieved.space(limit.end, bore_mm)?.is_some() => {
+                (Modified::TipReliefAmount, relief.amount_um)
+            }
+            _ => modification.greatest_of_ring(),
+        };
+        Err(leaves_nothing(modified, value, None))
     }
 
     /// Returns the flank's distance from the path, and the least one that undercuts it, if both flanks end at their
     /// crossing because of that distance.
     pub(crate) fn undercutting_distance_mm(&self) -> Option<(f64, f64)> {
-        let RingTooth { flank, limit, .. } = &self.set_back;
-        let critical_mm = flank.critical_distance_mm().filter(|_| limit.end == FlankEnd::Undercut)?;
+        let flank = &self.flank.flank;
+        let critical_mm = flank.critical_distance_mm().filter(|_| self.end_by_distance == FlankEnd::Undercut)?;
         Some((flank.distance_mm, critical_mm))
     }
 
-    /// Returns the largest radius of the space: that of the root, or of a tip relief beyond it.
-    pub(crate) fn outermost_radius_mm(&self) -> f64 {
-        self.shaped.map_or_else(|| self.set_back.flank.root_radius_mm(), |shaped| shaped.outermost_radius_mm)
+    /// Returns half the angle of the arc that joins rotated flanks at the root.
+    pub(crate) const fn root_arc_rad(&self) -> f64 {
+        self.flank.turned_rad.max(0.0)
     }
 
-    /// Returns its end at the tip.
-    pub(crate) fn tip(&self) -> Tip {
-        match &self.shaped {
-            Some(shaped) => shaped.tip,
-            None => Tip { radius_mm: self.set_back.tip_radius_mm, has_land: self.set_back.limit.end == FlankEnd::Bore },
+    /// Returns the flanks from tip to tip, with the middle of the space along x and the tip at this angle from it. They
+    /// are one curve if they are smooth at the root.
+    pub(crate) fn flanks(
+        &self,
+        tip_rad: f64,
+        density: Density,
+        stop: &dyn Stop,
+    ) -> Result<Vec<SampledCurve>, SolveError> {
+        let mut pieces = self.half(density, stop)?;
+        if self.root_arc_rad() == 0.0 {
+            // Both flanks start on the middle of the space.
+            let first = &mut pieces[0].points[0];
+            *first = Point2::new(first.coords.norm(), 0.0);
         }
+        if !self.tip.has_land
+            && let Some(end) = pieces.last_mut().and_then(|piece| piece.points.last_mut())
+        {
+            // Both flanks end on the symmetry line, where the tip is a point or smooth.
+            *end = on_circle(self.tip.radius_mm, tip_rad);
+        }
+        let image = |point: &Point2<f64>| Point2::new(point.x, 0.0 - point.y);
+        let image_tangent = |tangent: &Unit<Vector2<f64>>| Unit::new_unchecked(Vector2::new(-tangent.x, tangent.y));
+        let mirrored = |curve: &SampledCurve| SampledCurve {
+            points: curve.points.iter().rev().map(image).collect(),
+            tangents: curve.tangents.iter().rev().map(image_tangent).collect(),
+        };
+        let mut curves: Vec<_> = pieces.iter().rev().map(mirrored).collect();
+        let mut pieces = pieces.into_iter();
+        // A relief with a power above one starts along the curve.
+        let starts_bent = self.flank.relief.is_some_and(|relief| relief.start_rad == 0.0 && relief.power <= 1.0);
+        if self.flank.turned_rad == 0.0
+            && !starts_bent
+            && let (Some(before), Some(SampledCurve { points, tangents })) = (curves.last_mut(), pieces.next())
+        {
+            before.points.extend(&points[1..]);
+            before.tangents.extend(&tangents[1..]);
+        }
+        curves.extend(pieces);
+        Ok(curves)
     }
 
-    pub(crate) fn half(&self, density: Density, stop: &dyn Stop) -> Result<HalfSpace, SolveError> {
-        let Some(ShapedSpace { flank, start, end, .. }) = &self.shaped else {
-            let pieces = vec![flank_curve(&self.set_back.flank, self.set_back.limit.position, density, stop)?];
-            return Ok(HalfSpace { root_arc_rad: 0.0, is_smooth_at_root: true, pieces });
-        };
+    /// Returns a flank from the middle of the space outward, in two pieces if it contains the start of a tip relief.
+    fn half(&self, density: Density, stop: &dyn Stop) -> Result<Vec<SampledCurve>, SolveError> {
+        let Self { flank, start, end, .. } = self;
         let lobes = flank.flank.locus().lobes();
         let mut pieces = Vec::new();
         let mut piece = |from: Position, to: Position, is_relieved: bool| {
@@ -180,21 +202,14 @@ impl ToothSpace {
             }
             Some(_) => piece(*start, *end, true)?,
         }
-        // A relief with a power above one starts along the curve.
-        let starts_bent = flank.relief.is_some_and(|relief| relief.start_rad == 0.0 && relief.power <= 1.0);
-        Ok(HalfSpace {
-            root_arc_rad: flank.turned_rad.max(0.0),
-            is_smooth_at_root: flank.turned_rad == 0.0 && !starts_bent,
-            pieces,
-        })
+        Ok(pieces)
     }
 }
 
 impl ShapedFlank {
-    /// Builds the flank if more than its distance shapes it.
-    fn new(drive: &Drive, flank: RingFlank, modification: &Modification) -> Option<Self> {
+    fn new(drive: &Drive, flank: RingFlank, modification: &Modification) -> Self {
         let relief = modification.ring_tip_relief.filter(|relief| relief.amount_um != 0.0);
-        let shaped = Self {
+        Self {
             flank,
             path_shift_mm: MM_PER_UM * modification.ring_path_shift_um,
             profile_shift_mm: MM_PER_UM * modification.ring_profile_shift_um,
@@ -204,10 +219,13 @@ impl ShapedFlank {
                 let length_rad = drive.flank_limit().position.from_lobe_rad - start_rad;
                 Relief { amount_mm: MM_PER_UM * amount_um, start_rad, length_rad, power }
             }),
-        };
-        let is_shaped = shaped.relief.is_some()
-            || [shaped.path_shift_mm, shaped.profile_shift_mm, shaped.turned_rad].iter().any(|&by| by != 0.0);
-        is_shaped.then_some(shaped)
+        }
+    }
+
+    /// Returns true if more than its distance from the path shapes it.
+    fn is_shaped(&self) -> bool {
+        let shifts = [self.path_shift_mm, self.profile_shift_mm, self.turned_rad];
+        self.relief.is_some() || shifts.iter().any(|&by| by != 0.0)
     }
 
     /// Returns the distance from the path and its derivative by ψ. `is_relieved` selects the side at the start of the
@@ -273,6 +291,9 @@ impl ShapedFlank {
         [from, to]: [Position; 2],
         is_relieved: bool,
     ) -> Result<CurvePoint, NotConverged> {
+        if !self.is_shaped() {
+            return self.flank.curve_point(position);
+        }
         let lobes = position.lobes;
         let beside_rad = BESIDE_SHARE_OF_HALF_LOBE * half_lobe_rad(lobes);
         let tangent = |psi: f64| self.at(Position::from_lobe(psi, lobes), is_relieved).map(|at| at.tangent);
@@ -319,7 +340,7 @@ impl ShapedFlank {
     }
 
     /// Finds the start and the end of the flank; none if nothing is left.
-    fn space(self, bore_mm: Option<f64>) -> Result<Option<ShapedSpace>, NotConverged> {
+    fn space(self, end_by_distance: FlankEnd, bore_mm: Option<f64>) -> Result<Option<ToothSpace>, NotConverged> {
         let lobes = self.flank.locus().lobes();
         let half_rad = half_lobe_rad(lobes);
         // By the angle from the valley, each position exact from its nearer end.
@@ -404,6 +425,7 @@ impl ShapedFlank {
         };
         let has_land = is_turned_together || kind.is_some_and(|kind| kind != FlankEnd::Undercut);
         let outermost_radius_mm = self.outermost_radius_mm(start, end)?;
-        Ok(Some(ShapedSpace { flank: self, start, end, tip: Tip { radius_mm, has_land }, outermost_radius_mm }))
+        let tip = Tip { radius_mm, has_land };
+        Ok(Some(ToothSpace { flank: self, start, end, end_by_distance, tip, outermost_radius_mm }))
     }
 }

@@ -27,7 +27,7 @@ pub(crate) fn of_made_part(drive: &Drive, part: &MadePart) -> Result<Vec<Finding
 }
 
 fn of_ring(drive: &Drive, space: &ToothSpace, outer_radius_mm: f64) -> Vec<Finding> {
-    let thin = thin_wall(drive, Contact::Ring, outer_radius_mm - space.outermost_radius_mm());
+    let thin = thin_wall(drive, Contact::Ring, outer_radius_mm - space.outermost_radius_mm);
     let mut findings: Vec<_> = thin.into_iter().chain(groove_not_drawn(drive, Contact::Ring)).collect();
     if let Some((distance_mm, critical_mm)) = space.undercutting_distance_mm().filter(|_| !drive.flank().is_undercut())
     {
