@@ -117,7 +117,7 @@ impl<'a> LoadedDrive<'a> {
         is_of_capacity: bool,
     ) -> Result<Option<TorqueLimit>, SolveError> {
         let tooth_radius_mm = self.drive.parameters().tooth_radius_mm;
-        let Some(length_mm) = self.law.reference_length_mm(tooth_radius_mm) else { return Ok(None) };
+        let Some(length_mm) = self.load.law.reference_length_mm(tooth_radius_mm) else { return Ok(None) };
         let is_beyond = |tooth: &ToothState| tooth.spring.displacement_mm(rotation) >= tooth.spring.approach.limit_mm();
         if !teeth.iter().any(is_beyond) {
             return Ok(None);

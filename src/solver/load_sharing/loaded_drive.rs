@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::equilibrium::{Compatibility, ToothState};
-use super::load::LoadCase;
+use super::load::{LoadCase, LoadParameters};
 use crate::SolveError;
 use crate::contact::PerContact;
 use crate::contact_law::ContactLaw;
@@ -21,15 +21,13 @@ use crate::violation::{Parameter, Violation};
 #[derive(Debug, Clone, Copy)]
 pub struct LoadedDrive<'a> {
     pub(super) drive: &'a Drive,
+    pub(crate) load: LoadParameters,
     pub(super) mesh: Mesh,
-    pub(crate) compatibility: Compatibility,
     /// Factor from a sum over the listed teeth to the sum over all teeth.
     pub(crate) zones: f64,
     pub(super) input_torque_nmm: f64,
-    pub(super) law: ContactLaw,
     pub(crate) contacts: Contacts,
     pub(super) ring_bending: Option<RingBending>,
-    pub(super) wave_generator_moves: bool,
     pub(super) tip_corner: Option<TipCorner>,
     /// Growth of the corner's compliance for each unit of the logarithm by which a contact there is narrower, if the
     /// ring's teeth bend.
@@ -61,7 +59,7 @@ impl<'a> LoadedDrive<'a> {
         load: &LoadCase,
         deviations: Option<&'a Deviations>,
     ) -> Result<Self, SolveError> {
-        let p = load.parameters();
+        let p = *load.parameters();
         let contacts = Contacts::new(drive, p.carrier, &p.law, &p.materials, &p.series_compliance_mm_per_n);
         let contacts = contacts.ok_or_else(|| {
             SolveError::Impossible(vec![Violation::conflict(Parameter::Law, ContactLaw::OTHER_TEETH)])
@@ -70,13 +68,11 @@ impl<'a> LoadedDrive<'a> {
         let tip_corner = if load.presses_corners(drive) { TipCorner::of(drive.ring_tooth())? } else { None };
         let loaded = Self {
             drive,
+            load: p,
             mesh,
-            compatibility: p.compatibility,
             zones: mesh.zones_in_torque(),
             input_torque_nmm: 1e3 * load.input_torque_nm(drive),
-            law: p.law,
             contacts,
-            wave_generator_moves: p.wave_generator_moves,
             tip_corner,
             corner_growth_mm_per_n: tip_corner.filter(|_| p.ring_teeth_bend).map_or(0.0, |corner| {
                 corner.bending_growth() * p.materials.ring.compliance_per_mpa() / (PI * drive.tooth_width_mm())
@@ -111,16 +107,16 @@ impl<'a> LoadedDrive<'a> {
         Ok(loaded)
     }
 
-    /// Returns the same drive for lists in which each tooth represents this many.
-    pub(crate) const fn with_zones(self, zones: f64) -> Self {
-        Self { zones, ..self }
+    /// Returns the same drive for lists with one tooth at each place, which represents all that carry alike. If items
+    /// deviate, every tooth is listed.
+    pub(crate) fn with_one_tooth_a_place(&self) -> Self {
+        let zones = if self.mesh.tells_items_apart() { self.zones } else { self.mesh.lobes_loaded_alike() as f64 };
+        Self { zones, ..*self }
     }
 
-    /// Returns the same drive over the places of one zone ([`Mesh::as_one_zone`]). One tooth at each place represents
-    /// all that carry alike. If items deviate, every tooth is listed.
+    /// Returns the same over the places of one zone ([`Mesh::as_one_zone`]).
     pub(crate) fn as_one_zone(&self) -> Self {
-        let zones = if self.mesh.tells_items_apart() { self.zones } else { self.mesh.lobes_loaded_alike() as f64 };
-        Self { mesh: self.mesh.as_one_zone(), zones, ..*self }
+        Self { mesh: self.mesh.as_one_zone(), ..self.with_one_tooth_a_place() }
     }
 
     /// Returns the drive.
@@ -140,7 +136,7 @@ impl<'a> LoadedDrive<'a> {
 
     /// Returns the contacts for column-wise evaluation, or none if more than their own law decides about the load.
     pub(crate) fn contacts_in_columns(&self) -> Option<&Contacts> {
-        let are_alone = self.ring_bending.is_none() && !self.wave_generator_moves && self.tip_corner.is_none();
+        let are_alone = self.ring_bending.is_none() && !self.load.wave_generator_moves && self.tip_corner.is_none();
         are_alone.then_some(&self.contacts)
     }
 
@@ -211,7 +207,7 @@ impl<'a> LoadedDrive<'a> {
 
     /// Returns the reason why teeth carry no torque, or less than the required torque.
     pub(crate) fn carries_nothing(&self, teeth: &[ToothState]) -> SolveError {
-        if self.wave_generator_moves && teeth.iter().any(|tooth| tooth.spring.arm_mm > 0.0) {
+        if self.load.wave_generator_moves && teeth.iter().any(|tooth| tooth.spring.arm_mm > 0.0) {
             SolveError::TurnedPastTeeth
         } else {
             SolveError::NoLeverArm

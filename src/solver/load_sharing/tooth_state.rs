@@ -60,7 +60,7 @@ impl<'a> LoadedDrive<'a> {
         let can_be_pressed = corner.is_none() || (at_corner.is_some() && !self.has_left_slot(&center));
         let force_ratio = at_corner.unwrap_or_else(|| force_ratio(sense, flank_curve, &center));
         // Corners are pressed with virtual work only.
-        let weights = match self.compatibility {
+        let weights = match self.load.compatibility {
             Compatibility::VirtualWork => force_ratio,
             Compatibility::Projection => projected_weights(sense, flank_curve, &center),
         };
@@ -76,7 +76,7 @@ impl<'a> LoadedDrive<'a> {
         } else {
             let mut gaps_mm = self.gaps.besides_turns(place, &center, &flank);
             let mut turned = self.gaps.turned_at(place);
-            if self.wave_generator_moves || corner.is_some() {
+            if self.load.wave_generator_moves || corner.is_some() {
                 // This also holds in the valley, where the gap has no weight.
                 turned = turned.and_aside(std::mem::take(&mut gaps_mm.carrier), center.center_radius_mm);
             }
@@ -87,7 +87,7 @@ impl<'a> LoadedDrive<'a> {
             }
             let along_mm = weights.iter().fold(0.0, |sum, (contact, weight)| sum + weight * gaps_mm.get(contact));
             let lost_motion_rad = turned.lost_motion_rad(self.drive);
-            Some(match self.compatibility {
+            Some(match self.load.compatibility {
                 // Weights of clearances were checked before; a negative sum is rounding.
                 Compatibility::Projection => Gap { along_mm: along_mm.max(0.0), lost_motion_rad },
                 Compatibility::VirtualWork => {
@@ -105,7 +105,7 @@ impl<'a> LoadedDrive<'a> {
         let bending =
             self.ring_bending.map_or(0.0, |ring| ring.compliance_mm_per_n(flank_curve.point(&center, &flank)));
         let approach = self.contacts.approach(&force_ratio, &weights, &pressure, bending);
-        if self.compatibility == Compatibility::Projection {
+        if self.load.compatibility == Compatibility::Projection {
             let compliance_mm_per_n = approach.least_part_mm();
             if compliance_mm_per_n <= 0.0 {
                 let position_deg = center.position.from_lobe_deg();
@@ -123,7 +123,7 @@ impl<'a> LoadedDrive<'a> {
     /// derivative of `d tan γ cos γ` by the position, with γ in the cosine constant (docs/explanation/theory.md section
     /// 4.4).
     fn arm_decline_mm_per_rad(&self, center: &ToothCenter) -> f64 {
-        if !self.wave_generator_moves {
+        if !self.load.wave_generator_moves {
             return 0.0;
         }
         let &ToothCenter { tan_pressure_angle: t, tan_pressure_angle_derivative, center_radius_mm, .. } = center;

@@ -1,7 +1,7 @@
 //! Input angles of a sweep to a tolerance: those at which the search for extremes evaluated the drive, plus enough
 //! others that linear interpolation between them meets a resolution.
 
-use crate::load_sharing::{LoadCase, LoadedDrive};
+use crate::load_sharing::LoadedDrive;
 use crate::mesh::{Mesh, PlacedTooth};
 use crate::position::Position;
 use crate::sweep::fast;
@@ -66,7 +66,6 @@ impl Moment {
 /// a jump of the loads the same angle is listed twice: first without the tooth that enters, then with it.
 pub(crate) fn moments(
     loaded: &LoadedDrive<'_>,
-    load: &LoadCase,
     tolerance: Tolerance,
     looking: Looking,
     stop: &dyn Stop,
@@ -76,23 +75,23 @@ pub(crate) fn moments(
     let resolution = tolerance.relative().clamp(FINEST_RESOLUTION, COARSEST_RESOLUTION);
     let pieces = || (0..laps).flat_map(|lap| Piece::of(loaded, lap));
     let in_columns = match looking {
-        Looking::Fast => fast::moments(loaded, pieces(), tolerance, resolution, load, stop)?,
+        Looking::Fast => fast::moments(loaded, pieces(), tolerance, resolution, stop)?,
         Looking::Plain => None,
     };
     let found = match in_columns {
         Some(found) => found,
         None => {
-            let plain = PlainLook::new(loaded, load, stop);
+            let plain = PlainLook::new(loaded, stop);
             // The plain path covers every moment.
             let look = |fractions: &[f64], seen: &mut Seen| plain.look(fractions, seen).map(|()| true);
-            search(&plain.searched()?, pieces(), tolerance, Some(resolution), stop, look)?.unwrap_or_default()
+            search(&plain.searched(), pieces(), tolerance, Some(resolution), stop, look)?.unwrap_or_default()
         }
     };
     let mut by_lap = vec![Vec::new(); usize::try_from(laps).unwrap_or(usize::MAX)];
     // If lever arms vary, a tooth is pressed before it is lifted, because it is then behind the valley.
-    let loads_jump = mesh.loads_jump_at_entry() || load.parameters().wave_generator_moves;
+    let loads_jump = mesh.loads_jump_at_entry() || loaded.load.wave_generator_moves;
     let without_load = if tolerance.looks_without_load && loaded.has_gaps() {
-        unloaded::extremes(&PlainLook::new(loaded, load, stop), pieces(), tolerance, stop)?
+        unloaded::extremes(&PlainLook::new(loaded, stop), pieces(), tolerance, stop)?
     } else {
         Vec::new()
     };

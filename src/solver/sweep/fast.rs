@@ -47,7 +47,7 @@ use tile::{Run, Tile, TileSize};
 use unit::Unit;
 
 use crate::contact::{Contact, PerContact};
-use crate::load_sharing::{LoadCase, LoadedDrive};
+use crate::load_sharing::LoadedDrive;
 use crate::mesh::{Mesh, Samples};
 use crate::position::Position;
 use crate::sweep::columns::{self, ContactPeaks, Peak, PeaksSoFar, Sweep, SweepPeaks, TorqueCapacity};
@@ -57,14 +57,9 @@ use crate::{SolveError, Stop};
 
 /// Returns the sweep, and its capacity if the load has an allowable stress. Returns none if the plain path has to compute
 /// it: for laws without columns, possible interference, and drives beyond the limits.
-pub(crate) fn sweep(
-    loaded: &LoadedDrive<'_>,
-    samples: Samples,
-    load: &LoadCase,
-    stop: &dyn Stop,
-) -> Result<Option<Sweep>, SolveError> {
+pub(crate) fn sweep(loaded: &LoadedDrive<'_>, samples: Samples, stop: &dyn Stop) -> Result<Option<Sweep>, SolveError> {
     let one_zone = loaded.as_one_zone();
-    let Some(kernel) = Kernel::new(&one_zone, load) else { return Ok(None) };
+    let Some(kernel) = Kernel::new(&one_zone) else { return Ok(None) };
     let laps = Laps::new(loaded.mesh(), samples);
     let mut sink = ColumnSink::new(loaded.drive(), &laps);
     let Some(totals) = kernel.fill(&laps, stop, &mut sink)? else { return Ok(None) };
@@ -77,10 +72,9 @@ pub(crate) fn sweep(
 pub(crate) fn peaks(
     loaded: &LoadedDrive<'_>,
     samples: Samples,
-    load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<SweepPeaks>, SolveError> {
-    let Some(kernel) = Kernel::new(loaded, load) else { return Ok(None) };
+    let Some(kernel) = Kernel::new(loaded) else { return Ok(None) };
     let mut sink = PeakSink::new(loaded.drive());
     let Some(totals) = kernel.fill(&Laps::new(loaded.mesh(), samples), stop, &mut sink)? else { return Ok(None) };
     columns::check("torque balance", totals.torque_balance_residual)?;
@@ -96,11 +90,10 @@ pub(crate) fn moments(
     pieces: impl Iterator<Item = Piece>,
     tolerance: Tolerance,
     resolution: f64,
-    load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<Found>, SolveError> {
     let one_zone = loaded.as_one_zone();
-    let Some(kernel) = Kernel::new(&one_zone, load) else { return Ok(None) };
+    let Some(kernel) = Kernel::new(&one_zone) else { return Ok(None) };
     let mut arena = Vec::new();
     let mut look = FastLook::new(&kernel, *loaded.mesh(), &mut arena, stop);
     search(&look.searched(), pieces, tolerance, Some(resolution), stop, |fractions, seen| look.look(fractions, seen))
@@ -110,10 +103,9 @@ pub(crate) fn moments(
 pub(crate) fn true_peaks(
     loaded: &LoadedDrive<'_>,
     tolerance: Tolerance,
-    load: &LoadCase,
     stop: &dyn Stop,
 ) -> Result<Option<SweepPeaks>, SolveError> {
-    let Some(kernel) = Kernel::new(loaded, load) else { return Ok(None) };
+    let Some(kernel) = Kernel::new(loaded) else { return Ok(None) };
     let (mesh, mut arena) = (*loaded.mesh(), Vec::new());
     let mut look = FastLook::new(&kernel, mesh, &mut arena, stop);
     let pieces = Piece::of(loaded, 0);
@@ -140,7 +132,6 @@ pub(crate) fn true_peaks(
 /// A drive under a load, with its constants.
 struct Kernel<'a> {
     loaded: &'a LoadedDrive<'a>,
-    load: &'a LoadCase,
     shape: Shape,
     r: f64,
     ring_teeth_per_wave: f64,
@@ -160,7 +151,7 @@ struct Kernel<'a> {
 }
 
 impl<'a> Kernel<'a> {
-    fn new(loaded: &'a LoadedDrive<'a>, load: &'a LoadCase) -> Option<Self> {
+    fn new(loaded: &'a LoadedDrive<'a>) -> Option<Self> {
         let (unit, sharing) = match Sharing::new(loaded)? {
             Sharing::Linear(law) if loaded.is_linear() => (Unit::rotation(&law.compliance_mm_per_n, loaded), None),
             sharing => (Unit::NEWTON, Some(sharing)),
@@ -171,7 +162,6 @@ impl<'a> Kernel<'a> {
         let (shape, ratios) = Shape::new(&drive.flank().cam, r)?;
         let mut kernel = Self {
             loaded,
-            load,
             shape,
             r,
             ring_teeth_per_wave: drive.flank().teeth_per_wave(),
@@ -185,7 +175,7 @@ impl<'a> Kernel<'a> {
             ring_terms: arctangent_terms(ratios.ring)?,
             allowable_mpa: None,
         };
-        kernel.allowable_mpa = load.parameters().allowable_stress_mpa.filter(|_| !kernel.is_in_proportion());
+        kernel.allowable_mpa = loaded.load.allowable_stress_mpa.filter(|_| !kernel.is_in_proportion());
         Some(kernel)
     }
 
@@ -206,7 +196,7 @@ impl<'a> Kernel<'a> {
         peaks: &mut PerContact<ContactPeaks>,
         torque_capacity: Option<TorqueCapacity>,
     ) -> Result<Option<TorqueCapacity>, SolveError> {
-        let (drive, load) = (self.loaded.drive(), self.load.parameters());
+        let (drive, load) = (self.loaded.drive(), &self.loaded.load);
         let torque_capacity = torque_capacity.or_else(|| {
             let input_torque_nm = 1e-3 * self.loaded.input_torque_nmm();
             let exponents = self.pressures.stress_exponents();

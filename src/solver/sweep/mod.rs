@@ -46,16 +46,16 @@ pub use unloaded::unloaded_wind_up_deg;
 /// [`SolveError::TooManyStates`] if a tolerance needs more states than allowed, [`SolveError::Inconsistent`] if the
 /// answer's own checks fail, [`SolveError::Stopped`] if `stop` is set.
 pub fn sweep(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
-    swept(&LoadedDrive::new(drive, load)?, load, points, stop)
+    swept(&LoadedDrive::new(drive, load)?, points, stop)
 }
 
-fn swept(loaded: &LoadedDrive<'_>, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
+fn swept(loaded: &LoadedDrive<'_>, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
     if let Points::Samples(samples) = points
-        && let Some(sweep) = fast::sweep(loaded, samples, load, stop)?
+        && let Some(sweep) = fast::sweep(loaded, samples, stop)?
     {
         return Ok(sweep);
     }
-    plain::sweep(loaded, load, points, Looking::Fast, stop)
+    plain::sweep(loaded, points, Looking::Fast, stop)
 }
 
 /// Runs the sweep of a drive with deviations of individual items. States are listed by slot and lobe. The sweep covers
@@ -86,7 +86,7 @@ pub fn sweep_with_deviations(
     points: Points,
     stop: &dyn Stop,
 ) -> Result<Sweep, SolveError> {
-    swept(&LoadedDrive::deviating(drive, load, deviations)?, load, points, stop)
+    swept(&LoadedDrive::deviating(drive, load, deviations)?, points, stop)
 }
 
 /// Returns the peaks of the sweep over one period without its states, in less time. Period closure is not checked. If
@@ -109,16 +109,16 @@ pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) ->
     let loaded = LoadedDrive::new(drive, load)?;
     let (mesh, one_zone) = (loaded.mesh(), loaded.as_one_zone());
     let peaks = match points {
-        Points::Samples(samples) => fast::peaks(&one_zone, mesh.samples_of_lap(samples), load, stop)?,
-        Points::Tolerance(tolerance) => fast::true_peaks(&one_zone, tolerance, load, stop)?,
+        Points::Samples(samples) => fast::peaks(&one_zone, mesh.samples_of_lap(samples), stop)?,
+        Points::Tolerance(tolerance) => fast::true_peaks(&one_zone, tolerance, stop)?,
     };
     if let Some(peaks) = peaks {
         return Ok(SweepPeaks { loaded_teeth: peaks.loaded_teeth.times(mesh.listed_at_each_place()), ..peaks });
     }
     match points {
-        Points::Samples(samples) => plain::peaks(&loaded, load, samples, stop),
+        Points::Samples(samples) => plain::peaks(&loaded, samples, stop),
         Points::Tolerance(_) => {
-            plain::sweep(&loaded, load, points, Looking::Fast, stop).map(|sweep| SweepPeaks::from(&sweep))
+            plain::sweep(&loaded, points, Looking::Fast, stop).map(|sweep| SweepPeaks::from(&sweep))
         }
     }
 }
@@ -130,7 +130,7 @@ pub fn peaks(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) ->
 /// As [`sweep`].
 #[doc(hidden)]
 pub fn sweep_plain(drive: &Drive, load: &LoadCase, points: Points, stop: &dyn Stop) -> Result<Sweep, SolveError> {
-    plain::sweep(&LoadedDrive::new(drive, load)?, load, points, Looking::Plain, stop)
+    plain::sweep(&LoadedDrive::new(drive, load)?, points, Looking::Plain, stop)
 }
 
 /// Runs the same for a drive with deviations of individual items.
@@ -145,5 +145,5 @@ pub fn sweep_plain_with_deviations(
     points: Points,
     stop: &dyn Stop,
 ) -> Result<Sweep, SolveError> {
-    plain::sweep(&LoadedDrive::deviating(drive, load, deviations)?, load, points, Looking::Plain, stop)
+    plain::sweep(&LoadedDrive::deviating(drive, load, deviations)?, points, Looking::Plain, stop)
 }

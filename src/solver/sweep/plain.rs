@@ -1,7 +1,7 @@
 //! Sweep state by state: the reference for the fast path, and the fallback for drives it does not support.
 
 use crate::contact::PerContact;
-use crate::load_sharing::{LoadCase, LoadedDrive, ToothState, TorqueLimit};
+use crate::load_sharing::{LoadedDrive, ToothState, TorqueLimit};
 use crate::mesh::{PlacedTooth, Samples};
 use crate::root::NotConverged;
 use crate::springs::WindUp;
@@ -17,13 +17,12 @@ use crate::{SolveError, Stop};
 /// Runs the sweep.
 pub(crate) fn sweep(
     loaded: &LoadedDrive<'_>,
-    load: &LoadCase,
     points: Points,
     looking: Looking,
     stop: &dyn Stop,
 ) -> Result<Sweep, SolveError> {
     let mesh = *loaded.mesh();
-    let mut columns = Growing::new(loaded, load, stop);
+    let mut columns = Growing::new(loaded, stop);
     match points {
         Points::Samples(samples) => {
             columns.begin(mesh.state_count(samples), mesh.last_sample(samples) + 1);
@@ -32,7 +31,7 @@ pub(crate) fn sweep(
             }
         }
         Points::Tolerance(tolerance) => {
-            let by_lap = adaptive::moments(loaded, load, tolerance, looking, stop)?;
+            let by_lap = adaptive::moments(loaded, tolerance, looking, stop)?;
             // Each place was counted once. It may represent several listed teeth, and occurs in every lap.
             let places = by_lap.iter().flatten().map(|moment| moment.places()).sum::<u64>();
             let listed = places * (mesh.laps() / by_lap.len() as u64) * mesh.listed_at_each_place();
@@ -54,15 +53,10 @@ pub(crate) fn sweep(
 }
 
 /// Returns the peaks of a sweep over equal intervals, keeping only some states at a time.
-pub(crate) fn peaks(
-    loaded: &LoadedDrive<'_>,
-    load: &LoadCase,
-    samples: Samples,
-    stop: &dyn Stop,
-) -> Result<SweepPeaks, SolveError> {
+pub(crate) fn peaks(loaded: &LoadedDrive<'_>, samples: Samples, stop: &dyn Stop) -> Result<SweepPeaks, SolveError> {
     const STATES_AT_A_TIME: u64 = 1024;
     let mesh = *loaded.mesh();
-    let mut columns = Growing::new(loaded, load, stop);
+    let mut columns = Growing::new(loaded, stop);
     for sample in 0..=mesh.last_sample(samples) {
         if sample == 0 || columns.states.len() as u64 >= STATES_AT_A_TIME {
             columns.begin(2 * STATES_AT_A_TIME, STATES_AT_A_TIME);
@@ -77,7 +71,6 @@ pub(crate) fn peaks(
 /// Sweep that is built input angle by input angle.
 struct Growing<'a> {
     loaded: &'a LoadedDrive<'a>,
-    load: &'a LoadCase,
     stop: &'a dyn Stop,
     states: States,
     input_angles: InputAngles,
@@ -95,10 +88,9 @@ struct Growing<'a> {
 }
 
 impl<'a> Growing<'a> {
-    fn new(loaded: &'a LoadedDrive<'a>, load: &'a LoadCase, stop: &'a dyn Stop) -> Self {
+    fn new(loaded: &'a LoadedDrive<'a>, stop: &'a dyn Stop) -> Self {
         Self {
             loaded,
-            load,
             stop,
             states: States::default(),
             input_angles: InputAngles::default(),
@@ -144,7 +136,7 @@ impl<'a> Growing<'a> {
         let wind_up_deg = wind_up.rotation_rad().to_degrees();
         self.input_angles.push(input_angle_deg, wind_up_deg, stiffness, loaded_teeth);
         self.angles.see(wind_up_deg, stiffness, u64::from(loaded_teeth));
-        if let Some(allowable_stress_mpa) = &self.load.parameters().allowable_stress_mpa {
+        if let Some(allowable_stress_mpa) = &self.loaded.load.allowable_stress_mpa {
             let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa)?;
             let input_torque_nm = 1e-3 * limit.input_torque_nmm;
             if self.torque_capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
@@ -217,7 +209,7 @@ impl<'a> Growing<'a> {
         if let Some(error) = &self.law_end {
             return Err(error.clone());
         }
-        let materials = &self.load.parameters().materials;
+        let materials = &self.loaded.load.materials;
         Ok(PerContact::of(|contact| {
             let peaks = self.peaks.get(contact);
             let of_line = peaks.of_line(self.loaded.drive().tooth_width_mm());

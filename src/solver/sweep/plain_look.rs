@@ -1,30 +1,18 @@
 //! Search for the extremes of a sweep, evaluated tooth by tooth.
 
-use crate::contact::PerContact;
-use crate::load_sharing::{LoadCase, LoadedDrive, ToothState};
+use crate::load_sharing::{LoadedDrive, ToothState};
 use crate::sweep::search::{LOADS, Piece, SearchedDrive, Seen};
 use crate::{SolveError, Stop};
 
 /// Evaluates moments tooth by tooth.
 pub(crate) struct PlainLook<'a> {
-    /// With one tooth at each place of the mesh, which represents all that carry alike. If items deviate, with every
-    /// tooth.
     pub(crate) loaded: LoadedDrive<'a>,
-    allowable_stress_mpa: Option<PerContact<f64>>,
-    has_gaps: bool,
     stop: &'a dyn Stop,
 }
 
 impl<'a> PlainLook<'a> {
-    pub(crate) fn new(loaded: &LoadedDrive<'a>, load: &LoadCase, stop: &'a dyn Stop) -> Self {
-        let mesh = *loaded.mesh();
-        let tells_items_apart = mesh.tells_items_apart();
-        Self {
-            loaded: if tells_items_apart { *loaded } else { loaded.with_zones(mesh.lobes_loaded_alike() as f64) },
-            allowable_stress_mpa: load.parameters().allowable_stress_mpa,
-            has_gaps: loaded.has_gaps() || tells_items_apart,
-            stop,
-        }
+    pub(crate) fn new(loaded: &LoadedDrive<'a>, stop: &'a dyn Stop) -> Self {
+        Self { loaded: loaded.with_one_tooth_a_place(), stop }
     }
 
     /// Returns the teeth of a piece, place by place. Errors of a tooth have the input angle.
@@ -47,16 +35,15 @@ impl<'a> PlainLook<'a> {
     }
 
     /// Returns what the search needs to know.
-    pub(crate) fn searched(&self) -> Result<SearchedDrive, SolveError> {
+    pub(crate) fn searched(&self) -> SearchedDrive<'_> {
         let (loaded, mesh) = (&self.loaded, self.loaded.mesh());
-        Ok(SearchedDrive {
-            has_gaps: self.has_gaps,
+        SearchedDrive {
+            loaded,
+            has_gaps: loaded.has_gaps(),
             is_linear: loaded.is_linear(),
             is_in_proportion: loaded.is_linear(),
-            input_torque_nmm: loaded.input_torque_nmm(),
-            distance_at_corner_rad: loaded.distance_at_corner_rad()?,
             teeth_at_each_place: if mesh.tells_items_apart() { mesh.listed_at_each_place() } else { 1 },
-        })
+        }
     }
 
     /// Appends moments of a piece.
@@ -65,13 +52,13 @@ impl<'a> PlainLook<'a> {
         for &fraction in fractions {
             let teeth = self.teeth(&piece, fraction)?;
             let wind_up = self.loaded.wind_up(&teeth)?;
-            if self.has_gaps {
+            if self.loaded.has_gaps() {
                 let rotation = wind_up.rotation;
                 let pressed_rad =
                     |tooth: &ToothState| rotation.excess_rad + (rotation.closing_rad - tooth.spring.closing_rad);
                 seen.pressed.extend(teeth.iter().map(pressed_rad));
             }
-            let per_capacity = match &self.allowable_stress_mpa {
+            let per_capacity = match &self.loaded.load.allowable_stress_mpa {
                 Some(allowable_mpa) => 1.0 / self.loaded.torque_limit(&teeth, allowable_mpa)?.input_torque_nmm,
                 None => 0.0,
             };
@@ -93,7 +80,7 @@ impl<'a> PlainLook<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ContactLaw, Drive, DriveParameters, LoadParameters, Never};
+    use crate::{ContactLaw, Drive, DriveParameters, LoadCase, LoadParameters, Never, PerContact};
 
     #[test]
     fn pressed_teeth_are_those_that_carry() {
@@ -105,7 +92,7 @@ mod tests {
         });
         let case = case.expect("a possible load");
         let loaded = LoadedDrive::new(&drive, &case).expect("a possible case");
-        let look = PlainLook::new(&loaded, &case, &Never);
+        let look = PlainLook::new(&loaded, &Never);
         for piece in Piece::of(&loaded, 0) {
             let count = usize::try_from(piece.places).expect("a few");
             let mut seen = Seen::new(piece, count);

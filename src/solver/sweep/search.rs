@@ -12,6 +12,7 @@ mod summit;
 
 use judge::Judge;
 
+use crate::load_sharing::LoadedDrive;
 use crate::root::NotConverged;
 use crate::sweep::points::Tolerance;
 use crate::{SolveError, Stop};
@@ -101,17 +102,14 @@ const QUARTERS: [f64; 3] = [0.25, 0.5, 0.75];
 const TOWARDS_START: [f64; 3] = [1.0 / 64.0, 1.0 / 16.0, 0.25];
 
 /// What a search needs to know of a drive under its load.
-pub(crate) struct SearchedDrive {
+pub(crate) struct SearchedDrive<'a> {
+    pub(crate) loaded: &'a LoadedDrive<'a>,
     /// True if teeth begin and cease to carry between their entry and their exit.
     pub(crate) has_gaps: bool,
     /// True if forces are proportional to the teeth's displacements. Every curve is then smooth up to its ends.
     pub(crate) is_linear: bool,
     /// True if the stiffness is proportional to the reciprocal of the rotation, so that they share their extremes.
     pub(crate) is_in_proportion: bool,
-    /// `M0`.
-    pub(crate) input_torque_nmm: f64,
-    /// Rotation that has the rounding error of a tooth's gap at a corner; 0 if no corner is pressed.
-    pub(crate) distance_at_corner_rad: f64,
     /// Number of teeth that are distinguished at each place.
     pub(crate) teeth_at_each_place: u64,
 }
@@ -141,7 +139,7 @@ pub(crate) struct Found {
 /// Errors of the evaluation; [`SolveError::TooManyStates`] beyond the tolerance's limit, [`SolveError::Stopped`] if
 /// stopped.
 pub(crate) fn search(
-    drive: &SearchedDrive,
+    drive: &SearchedDrive<'_>,
     pieces: impl Iterator<Item = Piece>,
     tolerance: Tolerance,
     lines: Option<f64>,
@@ -189,7 +187,7 @@ pub(crate) fn search(
         }
     }
     // The remaining excess is more than rounding only if the curves are not smooth.
-    if excess > tolerance.relative().max(OPEN).max(drive.rounding(&found.best)) {
+    if excess > tolerance.relative().max(OPEN).max(drive.rounding(&found.best)?) {
         return Err(NotConverged { what: "extremes of a sweep", iterations: MAX_ROUNDS, bracket_width: excess }.into());
     }
     Ok(Some(found))
@@ -209,15 +207,15 @@ impl Best {
     }
 }
 
-impl SearchedDrive {
+impl SearchedDrive<'_> {
     /// Returns the effect of rounding of closing angles on the loads, including a bend counted several times. The
     /// amplification is `Δφ K/M`, with M the given or the allowed torque. If teeth press against corners, Δφ is at
-    /// least `distance_at_corner_rad`.
-    fn rounding(&self, best: &[Best; QUANTITIES]) -> f64 {
+    /// least the rotation that has the rounding error of a tooth's gap there.
+    fn rounding(&self, best: &[Best; QUANTITIES]) -> Result<f64, NotConverged> {
         let [rotation_rad, stiffness_nmm_per_rad] = [LOADS, STIFFNESSES[0]].map(|quantity| best[quantity].value);
-        let per_torque = best[CAPACITY].value.max(1.0 / self.input_torque_nmm);
-        let rotation_rad = rotation_rad.max(self.distance_at_corner_rad);
-        ROUNDINGS * f64::EPSILON * (rotation_rad * stiffness_nmm_per_rad * per_torque)
+        let per_torque = best[CAPACITY].value.max(1.0 / self.loaded.input_torque_nmm());
+        let rotation_rad = rotation_rad.max(self.loaded.distance_at_corner_rad()?);
+        Ok(ROUNDINGS * f64::EPSILON * (rotation_rad * stiffness_nmm_per_rad * per_torque))
     }
 }
 

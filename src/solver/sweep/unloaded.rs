@@ -115,13 +115,7 @@ pub(crate) fn extremes(
         Ok(true)
     };
     // The curves do not depend on the set of carrying teeth, and none ends like a power.
-    let drive = SearchedDrive {
-        has_gaps: false,
-        is_linear: true,
-        is_in_proportion: false,
-        distance_at_corner_rad: 0.0,
-        ..plain.searched()?
-    };
+    let drive = SearchedDrive { has_gaps: false, is_linear: true, is_in_proportion: false, ..plain.searched() };
     // This method covers every moment.
     let found = search(&drive, pieces.into_iter(), tolerance, None, stop, look)?.unwrap_or_default();
     let sought = [EARLINESS, FIRST].map(|quantity| found.best[quantity]).into_iter();

@@ -117,15 +117,14 @@ impl<'a> FastLook<'a> {
         }
     }
 
-    /// Returns what the search needs to know. The kernel has no corners.
-    pub(super) fn searched(&self) -> SearchedDrive {
+    /// Returns what the search needs to know.
+    pub(super) fn searched(&self) -> SearchedDrive<'a> {
         let kernel = self.kernel;
         SearchedDrive {
+            loaded: kernel.loaded,
             has_gaps: kernel.gaps.is_some(),
             is_linear: kernel.sharing.as_ref().is_none_or(|sharing| matches!(sharing, Sharing::Linear(_))),
             is_in_proportion: kernel.is_in_proportion(),
-            input_torque_nmm: kernel.loaded.input_torque_nmm(),
-            distance_at_corner_rad: 0.0,
             teeth_at_each_place: self.layout.at_each_place as u64,
         }
     }

@@ -132,7 +132,7 @@ pub(super) struct Weights {
 
 impl Weights {
     pub(super) fn new(loaded: &LoadedDrive<'_>) -> Self {
-        match loaded.compatibility {
+        match loaded.load.compatibility {
             Compatibility::VirtualWork => Self { ring_exponent: 1.0, ring_decline: 0.0, carrier: 1.0 },
             // cos(γ + sβ) and s sin γ, with sin γ = F_S/F_H over Z_G/U.
             Compatibility::Projection => {

@@ -23,7 +23,7 @@ impl Unit {
         let drive = loaded.drive();
         let ring_teeth_per_wave = drive.flank().teeth_per_wave();
         let of_above = wave_generator + ring;
-        let of_lever = match loaded.compatibility {
+        let of_lever = match loaded.load.compatibility {
             // F_K²/F_H² = cos²γ/cos²β and F_S²/F_H² = sin²γ (Z_G/U)².
             Compatibility::VirtualWork => {
                 wave_generator + ring * ring_teeth_per_wave.powi(2) + carrier * drive.teeth_per_wave().powi(2)

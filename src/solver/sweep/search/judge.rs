@@ -11,7 +11,7 @@ use super::{
 
 /// Criteria of a round for the intervals between moments.
 pub(super) struct Judge<'a> {
-    pub(super) drive: &'a SearchedDrive,
+    pub(super) drive: &'a SearchedDrive<'a>,
     /// Largest values so far.
     pub(super) best: [f64; QUANTITIES],
     /// Relative tolerance.
