@@ -5,7 +5,7 @@ mod peaks;
 mod states;
 
 pub use checks::TorqueBalance;
-pub(crate) use checks::{check, checked, worse};
-pub(crate) use peaks::{AngleExtremes, PeaksSoFar};
+pub(crate) use checks::{checked, worse};
 pub use peaks::{ContactPeaks, Extremes, Peak, SweepPeaks, TorqueCapacity};
+pub(crate) use peaks::{PeaksSoFar, Totals};
 pub use states::{InputAngles, States, Sweep};

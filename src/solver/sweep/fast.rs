@@ -36,7 +36,6 @@ use std::iter::zip;
 use gaps::GapColumns;
 use lanes::arctangent_terms;
 use laps::{LapTeeth, Laps, Layout, whole};
-use loads::Totals;
 use moments::FastLook;
 use pressures::Pressures;
 use pulp::Simd;
@@ -50,7 +49,7 @@ use crate::contact::{Contact, PerContact};
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::{Mesh, Samples};
 use crate::position::Position;
-use crate::sweep::columns::{self, ContactPeaks, Peak, PeaksSoFar, Sweep, SweepPeaks, TorqueCapacity};
+use crate::sweep::columns::{self, ContactPeaks, Peak, PeaksSoFar, Sweep, SweepPeaks, TorqueCapacity, Totals};
 use crate::sweep::points::{Points, Tolerance};
 use crate::sweep::search::{Best, Found, Piece, search};
 use crate::{SolveError, Stop};
@@ -76,11 +75,10 @@ pub(crate) fn peaks(
 ) -> Result<Option<SweepPeaks>, SolveError> {
     let Some(kernel) = Kernel::new(loaded) else { return Ok(None) };
     let mut sink = PeakSink::new(loaded.drive());
-    let Some(totals) = kernel.fill(&Laps::new(loaded.mesh(), samples), stop, &mut sink)? else { return Ok(None) };
-    columns::check("torque balance", totals.torque_balance_residual)?;
+    let Some(mut totals) = kernel.fill(&Laps::new(loaded.mesh(), samples), stop, &mut sink)? else { return Ok(None) };
     let mut contacts = sink.contact_peaks();
-    let torque_capacity = kernel.complete(&mut contacts, totals.torque_capacity)?;
-    Ok(Some(sink.angles.peaks(contacts, torque_capacity, totals.torque_balance_residual)))
+    totals.torque_capacity = kernel.complete(&mut contacts, totals.torque_capacity)?;
+    totals.peaks(contacts).map(Some)
 }
 
 /// Returns the moments of a sweep to a tolerance over these pieces, with linear interpolation true to a resolution.
@@ -111,8 +109,7 @@ pub(crate) fn true_peaks(
     let pieces = Piece::of(loaded, 0);
     let found = search(&look.searched(), pieces, tolerance, None, stop, |fractions, seen| look.look(fractions, seen))?;
     let Some(Found { seen, best }) = found else { return Ok(None) };
-    let FastLook { angles, totals, .. } = look;
-    columns::check("torque balance", totals.torque_balance_residual)?;
+    let mut totals = look.totals;
     let peak = |Best { value, piece, moment, tooth }| {
         let (seen, fraction) = (&seen[piece], seen[piece].fractions[moment]);
         let position = seen.piece.position(&mesh, tooth as u64 + 1, fraction);
@@ -125,8 +122,8 @@ pub(crate) fn true_peaks(
         let peaks = PeaksSoFar { force_n: peak(best[force]), stress_mpa: peak(hardest), force_at_stress_n };
         peaks.of_line(loaded.drive().tooth_width_mm())
     });
-    let torque_capacity = kernel.complete(&mut contacts, totals.torque_capacity)?;
-    Ok(Some(angles.peaks(contacts, torque_capacity, totals.torque_balance_residual)))
+    totals.torque_capacity = kernel.complete(&mut contacts, totals.torque_capacity)?;
+    totals.peaks(contacts).map(Some)
 }
 
 /// A drive under a load, with its constants.
@@ -284,7 +281,10 @@ impl<K: Sink> pulp::WithSimd for Vectorised<'_, K> {
                             }
                             let Some(limit) = kernel.limit::<V>(&mut tile) else { return Ok(None) };
                             let angle_deg = |row: usize| laps.input_angle_deg(sample + row as u64);
-                            totals.take(kernel.loaded, &mut tile, limit.as_ref(), angle_deg);
+                            totals.add_torques(kernel.loaded, &mut tile, limit.as_ref(), angle_deg);
+                            if !K::COLUMNS {
+                                totals.add_rows(kernel.loaded.drive(), &tile);
+                            }
                             is_shared = !kernel.tells_items_apart();
                         }
                         let rows = tile.rows();

@@ -7,8 +7,7 @@ use crate::root::NotConverged;
 use crate::springs::WindUp;
 use crate::sweep::adaptive::{self, Looking};
 use crate::sweep::columns::{
-    AngleExtremes, ContactPeaks, InputAngles, Peak, PeaksSoFar, States, Sweep, SweepPeaks, TorqueBalance,
-    TorqueCapacity, check, checked, worse,
+    ContactPeaks, InputAngles, Peak, PeaksSoFar, States, Sweep, SweepPeaks, TorqueCapacity, Totals, checked, worse,
 };
 use crate::sweep::points::Points;
 use crate::tooth::Pressure;
@@ -64,8 +63,7 @@ pub(crate) fn peaks(loaded: &LoadedDrive<'_>, samples: Samples, stop: &dyn Stop)
         columns.add(mesh.input_angle_deg(sample, samples), mesh.placed_at(sample, samples))?;
     }
     let contacts = columns.contact_peaks()?;
-    check("torque balance", columns.torque_balance_residual)?;
-    Ok(columns.angles.peaks(contacts, columns.torque_capacity, columns.torque_balance_residual))
+    columns.totals.peaks(contacts)
 }
 
 /// Sweep that is built input angle by input angle.
@@ -74,14 +72,11 @@ struct Growing<'a> {
     stop: &'a dyn Stop,
     states: States,
     input_angles: InputAngles,
-    torque_capacity: Option<TorqueCapacity>,
+    totals: Totals,
     /// Set if the least limit is the end of Johnson's law instead of a stress.
     law_end: Option<SolveError>,
-    balance: TorqueBalance,
-    torque_balance_residual: f64,
     lists_lobes: bool,
     teeth: Vec<ToothState>,
-    angles: AngleExtremes,
     peaks: PerContact<PeaksSoFar>,
     /// Pressure model in the state of each stress peak.
     pressures: PerContact<Option<Pressure>>,
@@ -94,13 +89,10 @@ impl<'a> Growing<'a> {
             stop,
             states: States::default(),
             input_angles: InputAngles::default(),
-            torque_capacity: None,
+            totals: Totals::new(loaded),
             law_end: None,
-            balance: TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm()),
-            torque_balance_residual: 0.0,
             lists_lobes: !loaded.mesh().zones_are_alike(),
             teeth: Vec::new(),
-            angles: AngleExtremes::NONE,
             peaks: PerContact::of(|_| PeaksSoFar::NONE),
             pressures: PerContact::default(),
         }
@@ -135,14 +127,12 @@ impl<'a> Growing<'a> {
         let stiffness = InputAngles::of_output(self.loaded.drive(), wind_up.stiffness_nmm_per_rad);
         let wind_up_deg = wind_up.rotation_rad().to_degrees();
         self.input_angles.push(input_angle_deg, wind_up_deg, stiffness, loaded_teeth);
-        self.angles.see(wind_up_deg, stiffness, u64::from(loaded_teeth));
+        self.totals.add(wind_up_deg, stiffness, u64::from(loaded_teeth));
         if let Some(allowable_stress_mpa) = &self.loaded.load.allowable_stress_mpa {
-            let limit = self.loaded.torque_limit(&self.teeth, allowable_stress_mpa)?;
-            let input_torque_nm = 1e-3 * limit.input_torque_nmm;
-            if self.torque_capacity.is_none_or(|capacity| input_torque_nm < capacity.input_torque_nm) {
-                let TorqueLimit { contact, turns_past_teeth, law_end, .. } = limit;
-                let capacity = TorqueCapacity::new(self.loaded.drive(), input_torque_nm, contact, input_angle_deg);
-                self.torque_capacity = Some(TorqueCapacity { turns_past_teeth, ..capacity });
+            let TorqueLimit { input_torque_nmm, contact, turns_past_teeth, law_end } =
+                self.loaded.torque_limit(&self.teeth, allowable_stress_mpa)?;
+            let capacity = TorqueCapacity::new(self.loaded.drive(), 1e-3 * input_torque_nmm, contact, input_angle_deg);
+            if self.totals.add_capacity(TorqueCapacity { turns_past_teeth, ..capacity }) {
                 self.law_end = law_end;
             }
         }
@@ -199,8 +189,8 @@ impl<'a> Growing<'a> {
             torque_nmm.carrier += zones * force_n.carrier * center.center_radius_mm - beyond_nmm
                 + moved_nmm * self.loaded.drive().teeth_per_wave();
         }
-        let residual = self.balance.residual(&torque_nmm);
-        self.torque_balance_residual = worse(residual, self.torque_balance_residual);
+        let residual = self.totals.balance.residual(&torque_nmm);
+        self.totals.torque_balance_residual = worse(residual, self.totals.torque_balance_residual);
         Ok(loaded_teeth)
     }
 
@@ -225,8 +215,8 @@ impl<'a> Growing<'a> {
             peaks: self.contact_peaks()?,
             states: self.states,
             input_angles: self.input_angles,
-            torque_capacity: self.torque_capacity,
-            torque_balance_residual: self.torque_balance_residual,
+            torque_capacity: self.totals.torque_capacity,
+            torque_balance_residual: self.totals.torque_balance_residual,
             period_closure_residual: 0.0,
         };
         checked(sweep, self.loaded, points)

@@ -91,7 +91,7 @@ impl InputAngles {
 }
 
 /// Checks that a residual is only rounding.
-pub(crate) fn check(check: &'static str, residual: f64) -> Result<(), SolveError> {
+pub(super) fn check(check: &'static str, residual: f64) -> Result<(), SolveError> {
     if residual.is_nan() || residual > MOST_RESIDUAL {
         return Err(SolveError::Inconsistent { check, residual });
     }

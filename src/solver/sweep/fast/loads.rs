@@ -9,42 +9,24 @@ use super::pressures::Pressures;
 use super::sharing::Limit;
 use super::tile::Tile;
 use crate::contact::PerContact;
+use crate::drive::Drive;
 use crate::load_sharing::LoadedDrive;
 use crate::mesh::Mesh;
-use crate::sweep::columns::{TorqueBalance, TorqueCapacity, worse};
-
-/// Torque balance and capacity over all tiles.
-pub(super) struct Totals {
-    balance: TorqueBalance,
-    pub(super) torque_balance_residual: f64,
-    pub(super) torque_capacity: Option<TorqueCapacity>,
-}
+use crate::sweep::columns::{InputAngles, TorqueCapacity, Totals, worse};
 
 impl Totals {
-    pub(super) fn new(loaded: &LoadedDrive<'_>) -> Self {
-        let balance = TorqueBalance::new(loaded.drive(), loaded.input_torque_nmm());
-        Self { balance, torque_balance_residual: 0.0, torque_capacity: None }
-    }
-
-    /// Includes a tile and its limit.
+    /// Adds the torques of a tile, and its limit.
     #[inline(always)]
-    pub(super) fn take(
+    pub(super) fn add_torques(
         &mut self,
         loaded: &LoadedDrive<'_>,
         tile: &mut Tile<'_>,
         limit: Option<&Limit>,
         input_angle_deg: impl Fn(usize) -> f64,
     ) {
-        if let Some(limit) = limit {
-            let input_torque_nm = 1e-3 * (loaded.zones * limit.torque_nmm);
-            let capacity =
-                TorqueCapacity::new(loaded.drive(), input_torque_nm, limit.contact, input_angle_deg(limit.row));
-            // The first of equal ones counts, in any order of evaluation.
-            let is_first = |before: &TorqueCapacity| {
-                let order = before.input_torque_nm.total_cmp(&capacity.input_torque_nm);
-                order.then(before.input_angle_deg.total_cmp(&capacity.input_angle_deg)).is_le()
-            };
-            self.torque_capacity = Some(self.torque_capacity.filter(is_first).unwrap_or(capacity));
+        if let Some(&Limit { torque_nmm, contact, row }) = limit {
+            let input_torque_nm = 1e-3 * (loaded.zones * torque_nmm);
+            self.add_capacity(TorqueCapacity::new(loaded.drive(), input_torque_nm, contact, input_angle_deg(row)));
         }
         let rows = tile.rows();
         for row in 0..rows {
@@ -54,6 +36,15 @@ impl Totals {
         let residuals = tile.row_residual[..rows].iter();
         self.torque_balance_residual =
             residuals.fold(self.torque_balance_residual, |worst, &residual| worse(residual, worst));
+    }
+
+    /// Adds wind-up, stiffness and loaded teeth of a tile.
+    #[inline(always)]
+    pub(super) fn add_rows(&mut self, drive: &Drive, tile: &Tile<'_>) {
+        for row in 0..tile.rows() {
+            let stiffness = InputAngles::of_output(drive, tile.row_stiffness[row]);
+            self.add(tile.row_rotation_rad[row].to_degrees(), stiffness, tile.row_loaded[row] as u64);
+        }
     }
 }
 

@@ -6,13 +6,12 @@ use pulp::Simd;
 
 use super::Kernel;
 use super::laps::{LapTeeth, Layout, whole};
-use super::loads::Totals;
 use super::sharing::Sharing;
 use super::sinks::PeakSink;
 use super::tile::{Tile, TileSize};
 use crate::contact::Contact;
 use crate::mesh::Mesh;
-use crate::sweep::columns::AngleExtremes;
+use crate::sweep::columns::Totals;
 use crate::sweep::search::{LOADS, Piece, SearchedDrive, Seen};
 use crate::{SolveError, Stop};
 
@@ -29,7 +28,6 @@ pub(super) struct FastLook<'a> {
     /// Base positions of the teeth, for each piece of a lap that was evaluated.
     bases: Vec<Bases>,
     pub(super) totals: Totals,
-    pub(super) angles: AngleExtremes,
 }
 
 /// Base positions of the teeth of a piece: at its end for those near a lobe, at its start for all others, so that
@@ -113,7 +111,6 @@ impl<'a> FastLook<'a> {
             tile: Tile::new(arena, &size, 0.0, kernel.pressures.stress_exponents()),
             bases: Vec::new(),
             totals: Totals::new(kernel.loaded),
-            angles: AngleExtremes::NONE,
         }
     }
 
@@ -177,8 +174,8 @@ impl pulp::WithSimd for Looking<'_, '_> {
             (0..fractions.len()).for_each(|row| seen.pressed.extend(tile.work.pressed_rad(row, teeth)));
         }
         let Some(limit) = kernel.limit::<V>(tile) else { return false };
-        look.totals.take(loaded, tile, limit.as_ref(), |row| fractions[row] * look.mesh.sweep_period_deg());
-        look.angles.take(loaded.drive(), tile);
+        look.totals.add_torques(loaded, tile, limit.as_ref(), |row| fractions[row] * look.mesh.sweep_period_deg());
+        look.totals.add_rows(loaded.drive(), tile);
         for (row, &fraction) in fractions.iter().enumerate() {
             let at = tile.of_row(row);
             let (rotation_rad, stiffness) = (tile.row_rotation_rad[row], tile.row_stiffness[row]);

@@ -5,12 +5,11 @@ use std::ops::Range;
 
 use super::lanes::{first_product, largest, largest_product, repeat_each};
 use super::laps::{LapTeeth, Laps, whole};
-use super::loads::Totals;
 use super::tile::Tile;
 use crate::contact::{Contact, PerContact};
 use crate::drive::Drive;
 use crate::mesh::Place;
-use crate::sweep::columns::{AngleExtremes, ContactPeaks, InputAngles, Peak, PeaksSoFar, States, Sweep};
+use crate::sweep::columns::{ContactPeaks, InputAngles, Peak, PeaksSoFar, States, Sweep, Totals};
 
 /// Receives tiles, in order.
 pub(super) trait Sink {
@@ -224,27 +223,15 @@ impl RunningPeak {
     }
 }
 
-impl AngleExtremes {
-    /// Includes the extremes of a tile.
-    #[inline(always)]
-    pub(super) fn take(&mut self, drive: &Drive, tile: &Tile<'_>) {
-        for row in 0..tile.rows() {
-            let stiffness = InputAngles::of_output(drive, tile.row_stiffness[row]);
-            self.see(tile.row_rotation_rad[row].to_degrees(), stiffness, tile.row_loaded[row] as u64);
-        }
-    }
-}
-
 /// Receives peaks only.
 pub(super) struct PeakSink<'a> {
     drive: &'a Drive,
     contacts: PerContact<PeaksSoFar>,
-    pub(super) angles: AngleExtremes,
 }
 
 impl<'a> PeakSink<'a> {
     pub(super) fn new(drive: &'a Drive) -> Self {
-        Self { drive, contacts: PerContact::of(|_| PeaksSoFar::NONE), angles: AngleExtremes::NONE }
+        Self { drive, contacts: PerContact::of(|_| PeaksSoFar::NONE) }
     }
 
     pub(super) fn contact_peaks(&self) -> PerContact<ContactPeaks> {
@@ -258,7 +245,6 @@ impl Sink for PeakSink<'_> {
     #[inline(always)]
     fn take(&mut self, tile: &mut Tile<'_>, _: u64, _: &LapTeeth) {
         let count = tile.count;
-        self.angles.take(self.drive, tile);
         for contact in Contact::all() {
             let (force, scale) = (&tile.force.get(contact)[..count], &tile.scale[..count]);
             let (stress, root) = (&tile.stress.get(contact)[..count], &tile.stress_scale(contact)[..count]);
