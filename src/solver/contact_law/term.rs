@@ -26,28 +26,12 @@ pub(crate) struct LogarithmicTerm {
     pub(crate) length_mm: f64,
 }
 
-/// Coefficients of [`LogarithmicTerm`] at a place.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LogarithmicAt {
-    /// `A`.
-    pub(crate) compliance_mm_per_n: f64,
-    /// `B`.
-    pub(crate) growth_mm_per_n: f64,
-    /// `F_r`.
-    pub(crate) reference_n: f64,
-}
-
 impl LogarithmicTerm {
     /// Coefficients of a contact with another law.
     pub(crate) const NONE: Self = Self { compliance_mm_per_n: 0.0, growth_mm_per_n: 0.0, length_mm: 0.0 };
 
-    /// Returns the term for curvatures that sum to `curvature_per_mm`: `b² = 4 B F/Σ`.
-    pub(crate) fn at(&self, curvature_per_mm: f64) -> LogarithmicAt {
-        let reference_n = self.length_mm * (self.length_mm * curvature_per_mm) / (4.0 * self.growth_mm_per_n);
-        LogarithmicAt {
-            compliance_mm_per_n: self.compliance_mm_per_n,
-            growth_mm_per_n: self.growth_mm_per_n,
-            reference_n,
-        }
+    /// Returns `F_r` for curvatures that sum to `curvature_per_mm`: `b² = 4 B F/Σ`.
+    pub(crate) fn reference_n(&self, curvature_per_mm: f64) -> f64 {
+        self.length_mm * (self.length_mm * curvature_per_mm) / (4.0 * self.growth_mm_per_n)
     }
 }

@@ -223,13 +223,13 @@ impl Contacts {
             (
                 Term::Logarithmic(law),
                 Pressure::Line { curvature_per_mm, .. } | Pressure::Corner(CornerContact { curvature_per_mm, .. }),
-            ) => Some(law.at(*curvature_per_mm)),
+            ) => Some((law, law.reference_n(*curvature_per_mm))),
             _ => None,
         });
         let reference_n = force_ratio
             .iter()
             .filter(|&(_, &ratio)| ratio > 0.0)
-            .filter_map(|(contact, ratio)| johnson.get(contact).map(|law| law.reference_n / ratio));
+            .filter_map(|(contact, ratio)| johnson.get(contact).map(|(_, reference_n)| reference_n / ratio));
         let reference_n = reference_n.fold(f64::INFINITY, f64::min);
         for (contact, &ratio) in force_ratio.iter() {
             let weight = *weights.get(contact);
@@ -249,8 +249,8 @@ impl Contacts {
                 // A contact without a force has no approach, and a law only occurs with the pressure model of its own
                 // shape.
                 (Term::Logarithmic(_) | Term::Ellipse | Term::Flat, _) => {
-                    if let Some(law) = johnson.get(contact).filter(|_| ratio > 0.0) {
-                        let ln = (law.reference_n / ratio / reference_n).ln();
+                    if let Some((law, own_reference_n)) = johnson.get(contact).filter(|_| ratio > 0.0) {
+                        let ln = (own_reference_n / ratio / reference_n).ln();
                         linear_mm_per_n += weight * ratio * (law.compliance_mm_per_n + law.growth_mm_per_n * ln);
                         growth_mm_per_n += weight * ratio * law.growth_mm_per_n;
                     }
@@ -261,7 +261,7 @@ impl Contacts {
         if growth_mm_per_n > 0.0 {
             let smooth = Logarithmic::new(linear_mm_per_n, growth_mm_per_n, reference_n);
             match (johnson.ring, &pressure.ring) {
-                (Some(law), Pressure::Corner(corner)) => {
+                (Some((law, _)), Pressure::Corner(corner)) => {
                     let growth_mm_per_n = 2.0 * law.growth_mm_per_n + corner.bending_growth_mm_per_n;
                     let narrowing_n = corner.angle_rad * corner.angle_rad
                         / (PI * PI * corner.curvature_per_mm * law.growth_mm_per_n * force_ratio.ring);
