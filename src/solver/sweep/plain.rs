@@ -103,7 +103,8 @@ impl<'a> Growing<'a> {
         // The caller has bounded the counts to what fits in memory.
         let [states, input_angles] = [states, input_angles].map(|count| usize::try_from(count).unwrap_or(usize::MAX));
         self.states = States::with_capacity(states, self.lists_lobes);
-        self.input_angles = InputAngles::with_capacity(input_angles);
+        self.input_angles =
+            InputAngles::of_columns(|| Vec::with_capacity(input_angles), Vec::with_capacity(input_angles));
     }
 
     /// Appends the states of the teeth in mesh at one input angle.
@@ -126,7 +127,11 @@ impl<'a> Growing<'a> {
         let loaded_teeth = self.share_load(input_angle_deg, &wind_up)?;
         let stiffness = InputAngles::of_output(self.loaded.drive(), wind_up.stiffness_nmm_per_rad);
         let wind_up_deg = wind_up.rotation_rad().to_degrees();
-        self.input_angles.push(input_angle_deg, wind_up_deg, stiffness, loaded_teeth);
+        let angles = &mut self.input_angles;
+        angles.input_angle_deg.push(input_angle_deg);
+        angles.wind_up_deg.push(wind_up_deg);
+        angles.torsional_stiffness_nm_per_rad.push(stiffness);
+        angles.loaded_teeth.push(loaded_teeth);
         self.totals.add(wind_up_deg, stiffness, u64::from(loaded_teeth));
         if let Some(allowable_stress_mpa) = &self.loaded.load.allowable_stress_mpa {
             let TorqueLimit { input_torque_nmm, contact, turns_past_teeth, law_end } =

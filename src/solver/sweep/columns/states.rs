@@ -133,25 +133,9 @@ impl States {
 }
 
 impl InputAngles {
-    pub(crate) fn with_capacity(count: usize) -> Self {
-        let column = || Vec::with_capacity(count);
-        Self {
-            input_angle_deg: column(),
-            wind_up_deg: column(),
-            torsional_stiffness_nm_per_rad: column(),
-            loaded_teeth: Vec::with_capacity(count),
-        }
-    }
-
-    /// Returns columns of zeros, to be filled in.
-    pub(crate) fn of_zeros(count: usize) -> Self {
-        let column = || vec![0.0; count];
-        Self {
-            input_angle_deg: column(),
-            wind_up_deg: column(),
-            torsional_stiffness_nm_per_rad: column(),
-            loaded_teeth: vec![0; count],
-        }
+    pub(crate) fn of_columns(column: impl Fn() -> Vec<f64>, loaded_teeth: Vec<u32>) -> Self {
+        let (input_angle_deg, wind_up_deg) = (column(), column());
+        Self { input_angle_deg, wind_up_deg, torsional_stiffness_nm_per_rad: column(), loaded_teeth }
     }
 
     /// Returns the torsional stiffness at the output for `dM0/dΔφ`.
@@ -161,25 +145,12 @@ impl InputAngles {
         1e-3 * stiffness_nmm_per_rad * torque_ratio * torque_ratio
     }
 
-    /// Appends an input angle.
-    pub(crate) fn push(
-        &mut self,
-        input_angle_deg: f64,
-        wind_up_deg: f64,
-        torsional_stiffness_nm_per_rad: f64,
-        loaded_teeth: u32,
-    ) {
-        self.input_angle_deg.push(input_angle_deg);
-        self.wind_up_deg.push(wind_up_deg);
-        self.torsional_stiffness_nm_per_rad.push(torsional_stiffness_nm_per_rad);
-        self.loaded_teeth.push(loaded_teeth);
-    }
-
-    /// Appends the first input angle again, one period later.
+    /// Fills in the last input angle, one period after the first.
     pub(crate) fn repeat_first(&mut self, input_angle_deg: f64) {
-        self.input_angle_deg.push(input_angle_deg);
-        self.wind_up_deg.push(self.wind_up_deg[0]);
-        self.torsional_stiffness_nm_per_rad.push(self.torsional_stiffness_nm_per_rad[0]);
-        self.loaded_teeth.push(self.loaded_teeth[0]);
+        let last = self.input_angle_deg.len() - 1;
+        self.input_angle_deg[last] = input_angle_deg;
+        self.wind_up_deg[last] = self.wind_up_deg[0];
+        self.torsional_stiffness_nm_per_rad[last] = self.torsional_stiffness_nm_per_rad[0];
+        self.loaded_teeth[last] = self.loaded_teeth[0];
     }
 }

@@ -33,12 +33,9 @@ pub(super) struct ColumnSink<'a> {
 impl<'a> ColumnSink<'a> {
     pub(super) fn new(drive: &'a Drive, laps: &'a Laps) -> Self {
         let states = whole(laps.mesh.state_count(laps.samples));
+        let states = if laps.are_listed() { States::of_zeros(states) } else { States::with_capacity(states, false) };
         let samples = whole(laps.mesh.last_sample(laps.samples) + 1);
-        let (states, input_angles) = if laps.are_listed() {
-            (States::of_zeros(states), InputAngles::of_zeros(samples))
-        } else {
-            (States::with_capacity(states, false), InputAngles::with_capacity(samples))
-        };
+        let input_angles = InputAngles::of_columns(|| vec![0.0; samples], vec![0; samples]);
         Self { drive, laps, states, input_angles, peaks: PerContact::default() }
     }
 
@@ -71,22 +68,28 @@ impl<'a> ColumnSink<'a> {
         }
     }
 
+    /// Fills in the input angles of a tile, at each of which this many teeth are listed.
+    #[inline(always)]
+    fn fill_in_rows(&mut self, tile: &Tile<'_>, sample: u64, listed: usize) {
+        // A tooth that represents several is listed as often.
+        let (rows, times) = (tile.rows(), listed / tile.teeth);
+        let (angles, of_rows) = (&mut self.input_angles, whole(sample)..whole(sample) + rows);
+        angles.input_angle_deg[of_rows.clone()].copy_from_slice(&tile.row_input_angle_deg[..rows]);
+        for (row, at) in of_rows.enumerate() {
+            angles.wind_up_deg[at] = tile.row_rotation_rad[row].to_degrees();
+            let stiffness = InputAngles::of_output(self.drive, tile.row_stiffness[row]);
+            angles.torsional_stiffness_nm_per_rad[at] = stiffness;
+            angles.loaded_teeth[at] = u32::try_from(tile.row_loaded[row] * times).unwrap_or(u32::MAX);
+        }
+    }
+
     /// Puts the teeth of all zones into their listed order.
     #[inline(always)]
     fn list(&mut self, tile: &Tile<'_>, sample: u64, lap: &LapTeeth) {
-        let Self { drive, laps, states, input_angles, peaks } = self;
-        let (rows, teeth) = (tile.rows(), tile.teeth);
         let listed = lap.listed.iter().map(|run| run.at.len()).sum::<usize>();
-        let of_rows = whole(sample)..whole(sample) + rows;
-        input_angles.input_angle_deg[of_rows.clone()].copy_from_slice(&tile.row_input_angle_deg[..rows]);
-        for (row, at) in of_rows.enumerate() {
-            input_angles.wind_up_deg[at] = tile.row_rotation_rad[row].to_degrees();
-            let stiffness = InputAngles::of_output(drive, tile.row_stiffness[row]);
-            input_angles.torsional_stiffness_nm_per_rad[at] = stiffness;
-            // A tooth that represents several is listed as often.
-            let loaded = tile.row_loaded[row] * listed / teeth;
-            input_angles.loaded_teeth[at] = u32::try_from(loaded).unwrap_or(u32::MAX);
-        }
+        self.fill_in_rows(tile, sample, listed);
+        let Self { laps, states, peaks, .. } = self;
+        let (rows, teeth) = (tile.rows(), tile.teeth);
         let start = laps.states_before(sample);
         let all = start..start + rows * listed;
         let angles_of_rows = states.input_angle_deg[all.clone()].chunks_exact_mut(listed);
@@ -167,13 +170,8 @@ impl Sink for ColumnSink<'_> {
             self.list(tile, sample, listed);
             return;
         }
-        let (count, rows, angles) = (tile.count, tile.rows(), &mut self.input_angles);
-        angles.input_angle_deg.extend_from_slice(&tile.row_input_angle_deg[..rows]);
-        angles.wind_up_deg.extend(tile.row_rotation_rad[..rows].iter().map(|rotation_rad| rotation_rad.to_degrees()));
-        let stiffness =
-            tile.row_stiffness[..rows].iter().map(|&stiffness| InputAngles::of_output(self.drive, stiffness));
-        angles.torsional_stiffness_nm_per_rad.extend(stiffness);
-        angles.loaded_teeth.extend(tile.row_loaded.iter().map(|&teeth| u32::try_from(teeth).unwrap_or(u32::MAX)));
+        self.fill_in_rows(tile, sample, tile.teeth);
+        let (count, rows) = (tile.count, tile.rows());
         repeat_each(&tile.row_input_angle_deg[..rows], tile.teeth, tile.input_angle_deg);
         let states = &mut self.states;
         states.input_angle_deg.extend_from_slice(&tile.input_angle_deg[..count]);
