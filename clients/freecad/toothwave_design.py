@@ -425,7 +425,7 @@ def suited(values, chosen):
         count, lobes = values["ToothCount"], LOBES.get(values["WaveGeneratorKind"], values["Lobes"])
         return {"RingTeeth": count + (lobes if values["RingTeeth"] > count else -lobes)}
     is_ball, law, way = values["ToothShape"] == "ball", values["StiffnessLaw"], values["Compatibility"]
-    if law in OF_LINES if is_ball else law == "hertz":
+    if law in (OF_LINES if is_ball else ("hertz",)):
         law = BY_DEFAULT
     if way == "projection" and (law not in (BY_DEFAULT, *PROJECTED) or is_ball and law != "fixed"):
         law, way = (BY_DEFAULT, way) if chosen == "Compatibility" and not is_ball else (law, "virtual_work")

@@ -106,8 +106,10 @@ impl CheckedSweep {
     /// Returns the loss totals over all points of a duty but for the life of a bearing, given the sweep of the hardest;
     /// none without friction.
     pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotals>, SolveError> {
-        let costs = self.costs(hardest, None, stop)?;
-        Ok(costs.map(|(costs, _)| self.losses_along(costs.totals(self.duty.hardest, &hardest.states))))
+        let Some((costs, _)) = self.costs(hardest, None, stop)? else { return Ok(None) };
+        let mut totals = self.losses_along(costs.totals(self.duty.hardest, &hardest.states));
+        totals.bearing = None;
+        Ok(Some(totals))
     }
 
     /// Returns the losses of all points and those of the hardest, given its sweep; none without friction.

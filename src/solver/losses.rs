@@ -88,8 +88,8 @@ pub enum Fixed {
     WaveGenerator,
 }
 
-/// Output power divided by input power with one member fixed, for a given torque at the driven end. Answers have it with
-/// the ring fixed.
+/// Output power divided by input power with one member fixed, for a given torque at the driven end. In an answer the
+/// ring is fixed, and the fields are named after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "document",
@@ -97,7 +97,7 @@ pub enum Fixed {
     schema(description = "Efficiencies with the ring fixed, the torque at the driven end given.")
 )]
 pub struct Efficiencies<T> {
-    /// If the drive is driven as [`Fixed`] says.
+    /// In the direction that the variant of [`Fixed`] describes.
     #[cfg_attr(feature = "document", serde(rename = "ring_fixed"))]
     pub driven: T,
     /// If the drive is back-driven. At or below 0 it is self-locking. A negative value is the extra power required from

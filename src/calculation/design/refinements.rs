@@ -9,7 +9,7 @@ use utoipa::{PartialSchema, ToSchema};
 /// A set of refinements. Needs `virtual_work`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Refinements {
-    /// [`RefinementItem::Auto`]. Those of a model are resolved, without it.
+    /// [`RefinementItem::Auto`]; false in the answer's `model`, which lists what follows from the geometry.
     pub auto: bool,
     /// [`RefinementItem::RingTeethBend`].
     pub ring_teeth_bend: bool,

@@ -122,8 +122,8 @@ impl ContactLaw {
     /// The laws that need no numbers.
     pub const WITHOUT_NUMBERS: [Self; 4] = [Self::Linear, Self::Palmgren, Self::JOHNSON, Self::Hertz];
 
-    /// Says which laws suit which teeth.
-    pub(crate) const OTHER_TEETH: &'static str =
+    /// Message for a law that does not suit the teeth.
+    pub(crate) const SUITABLE: &'static str =
         "balls take `hertz` or `fixed`, and `hertz` is nowhere else: choose a law that teeth of this shape have";
 
     /// Asks the file of the law.

@@ -21,6 +21,7 @@ use crate::violation::{Parameter, Violation};
 #[derive(Debug, Clone, Copy)]
 pub struct LoadedDrive<'a> {
     pub(super) drive: &'a Drive,
+    /// Load as it was checked.
     pub(crate) load: LoadParameters,
     pub(super) mesh: Mesh,
     /// Factor from a sum over the listed teeth to the sum over all teeth.
@@ -61,9 +62,8 @@ impl<'a> LoadedDrive<'a> {
     ) -> Result<Self, SolveError> {
         let p = *load.parameters();
         let contacts = Contacts::new(drive, p.carrier, &p.law, &p.materials, &p.series_compliance_mm_per_n);
-        let contacts = contacts.ok_or_else(|| {
-            SolveError::Impossible(vec![Violation::conflict(Parameter::Law, ContactLaw::OTHER_TEETH)])
-        })?;
+        let contacts = contacts
+            .ok_or_else(|| SolveError::Impossible(vec![Violation::conflict(Parameter::Law, ContactLaw::SUITABLE)]))?;
         let mesh = load.mesh(drive, deviations.unwrap_or(&Deviations::default()));
         let tip_corner = if load.presses_corners(drive) { TipCorner::of(drive.ring_tooth())? } else { None };
         let loaded = Self {
@@ -114,7 +114,7 @@ impl<'a> LoadedDrive<'a> {
         Self { zones, ..*self }
     }
 
-    /// Returns the same over the places of one zone ([`Mesh::as_one_zone`]).
+    /// Returns the same drive over the places of one zone ([`Mesh::as_one_zone`]).
     pub(crate) fn as_one_zone(&self) -> Self {
         Self { mesh: self.mesh.as_one_zone(), ..self.with_one_tooth_a_place() }
     }

@@ -37,7 +37,7 @@ pub struct DutyPoint {
     pub share_of_time: f64,
 }
 
-/// Loads of a duty cycle, at least one.
+/// Loads of a duty cycle, none only if a document has no load.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Duty {
     /// All loads.
@@ -105,7 +105,7 @@ pub struct LossTotals {
 pub struct DutySweep<'a> {
     /// The drive.
     pub drive: &'a Drive,
-    /// Load with the largest torque of the duty. The other loads differ from it in the torque alone.
+    /// Load with the torque of the hardest point. The other loads differ from it in the torque alone.
     pub load: &'a LoadCase,
     /// Deviations of its single items.
     pub deviations: &'a Deviations,

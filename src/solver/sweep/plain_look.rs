@@ -6,6 +6,7 @@ use crate::{SolveError, Stop};
 
 /// Evaluates moments tooth by tooth.
 pub(crate) struct PlainLook<'a> {
+    /// With one tooth at each place, which represents all that carry alike.
     pub(crate) loaded: LoadedDrive<'a>,
     stop: &'a dyn Stop,
 }
