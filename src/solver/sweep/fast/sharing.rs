@@ -181,11 +181,15 @@ fn start_above(excess_alone: f64, weight: impl Fn(usize) -> f64, closing: &[f64]
 
 /// Computes the rotation of each tooth beyond closure at the rotation of its row.
 #[inline(always)]
-fn press(tile: &mut Tile<'_>) {
+fn press<const GAPS: bool>(tile: &mut Tile<'_>) {
     let (rows, len, work) = (tile.rows(), tile.len(), &mut tile.work);
     repeat_each(&work.row_excess[..rows], tile.teeth, work.excess);
-    repeat_each(&work.row_last[..rows], tile.teeth, work.last);
     let (excess, pressed) = (&work.excess[..len], &mut work.pressed[..len]);
+    if !GAPS {
+        pressed.copy_from_slice(excess);
+        return;
+    }
+    repeat_each(&work.row_last[..rows], tile.teeth, work.last);
     let (last, closing) = (&work.last[..len], &work.closing[..len]);
     for i in 0..len {
         pressed[i] = excess[i] + (last[i] - closing[i]);
@@ -234,7 +238,7 @@ fn turn_to_limit(tile: &mut Tile<'_>) -> bool {
             return false;
         }
     }
-    press(tile);
+    press::<true>(tile);
     true
 }
 
@@ -361,8 +365,8 @@ impl Sharing {
             Self::Linear(law) => law.share::<V>(torque_nmm, has_gaps, tile),
             Self::Palmgren(law) => law.share::<V>(torque_nmm, has_gaps, tile),
             Self::Hertz(law) => law.share::<V>(torque_nmm, has_gaps, tile),
-            Self::PalmgrenAndLinear(law) => law.share::<V>(torque_nmm, tile),
-            Self::Logarithmic(law) => law.share::<V>(torque_nmm, tile),
+            Self::PalmgrenAndLinear(law) => law.share::<V>(torque_nmm, has_gaps, tile),
+            Self::Logarithmic(law) => law.share::<V>(torque_nmm, has_gaps, tile),
         }
     }
 

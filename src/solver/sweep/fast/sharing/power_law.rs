@@ -154,7 +154,7 @@ pub(crate) trait Power {
     /// Computes `F/(Δφ - θ)` of the loaded teeth, which is p times the slope.
     #[inline(always)]
     fn tangents<V: Simd>(&self, tile: &mut Tile<'_>) {
-        press(tile);
+        press::<true>(tile);
         let len = tile.len();
         let (unit, pressed) = (&tile.work.unit[..len], &tile.work.pressed[..len]);
         let slope = &mut tile.work.slope[..len];

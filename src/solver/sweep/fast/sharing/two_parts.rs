@@ -43,7 +43,7 @@ pub(crate) trait TwoParts {
 
     /// Computes an initial force for each tooth, and the matching rotation.
     #[inline(always)]
-    fn start<V: Simd>(torque: f64, tile: &mut Tile<'_>) -> bool {
+    fn start<V: Simd, const GAPS: bool>(torque: f64, tile: &mut Tile<'_>) -> bool {
         let (len, work) = (tile.len(), &mut tile.work);
         let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &tile.torque.wave_generator[..len]);
         // Assumes that all forces equal the typical one.
@@ -59,10 +59,14 @@ pub(crate) trait TwoParts {
                 stiffness += arm[i] * secant[i];
             }
             let alone = torque / stiffness;
-            let Some(start) = start_above(alone, |i| arm[i] * secant[i], &work.closing[at]) else { return false };
-            (work.row_last[row], work.row_excess[row]) = start;
+            (work.row_last[row], work.row_excess[row]) = if GAPS {
+                let Some(start) = start_above(alone, |i| arm[i] * secant[i], &work.closing[at]) else { return false };
+                start
+            } else {
+                (0.0, alone)
+            };
         }
-        press(tile);
+        press::<GAPS>(tile);
         Self::guess::<V>(tile);
         true
     }
@@ -109,8 +113,8 @@ pub(crate) trait TwoParts {
         Self::guess::<V>(tile);
         let mut is_done = false;
         for _ in 0..MAX_ROUNDS {
-            Self::tangents::<V>(tile);
-            is_done = Self::follow(tile);
+            Self::tangents::<V, true>(tile);
+            is_done = Self::follow::<true>(tile);
             if is_done {
                 break;
             }
@@ -119,17 +123,22 @@ pub(crate) trait TwoParts {
         least_torque(per_allowable, tile).filter(|_| is_done && is_within)
     }
 
+    #[inline(always)]
+    fn share<V: Simd>(&self, torque_nmm: f64, has_gaps: bool, tile: &mut Tile<'_>) -> bool {
+        let torque = torque_nmm / tile.work.typical_n;
+        if has_gaps { Self::share_with::<V, true>(torque, tile) } else { Self::share_with::<V, false>(torque, tile) }
+    }
+
     /// Newton's method for all forces and the rotations together. Each force follows the tangent of its law, and the
     /// rotation is the one at which the tangents balance the torque. A round costs one logarithm or root for each
     /// state.
     #[inline(always)]
-    fn share<V: Simd>(&self, torque_nmm: f64, tile: &mut Tile<'_>) -> bool {
-        let torque = torque_nmm / tile.work.typical_n;
-        if !Self::start::<V>(torque, tile) {
+    fn share_with<V: Simd, const GAPS: bool>(torque: f64, tile: &mut Tile<'_>) -> bool {
+        if !Self::start::<V, GAPS>(torque, tile) {
             return false;
         }
         for _ in 0..MAX_ROUNDS {
-            Self::tangents::<V>(tile);
+            Self::tangents::<V, GAPS>(tile);
             let mut is_done = true;
             for row in 0..tile.rows() {
                 let (at, work) = (tile.of_row(row), &mut tile.work);
@@ -139,18 +148,18 @@ pub(crate) trait TwoParts {
                 let last = work.row_last[row];
                 for i in 0..tile.teeth {
                     stiffness += arm[i] * slope[i];
-                    let before = if slope[i] > 0.0 { (last - closing[i]) * slope[i] } else { 0.0 };
+                    let before = if GAPS && slope[i] > 0.0 { (last - closing[i]) * slope[i] } else { 0.0 };
                     of_offset += arm[i] * (offset[i] + before);
                 }
                 let excess = (torque - of_offset) / stiffness;
                 work.row_excess[row] = excess;
-                if excess <= 0.0 {
+                if GAPS && excess <= 0.0 {
                     is_done = false;
                     let carrying = last_below(closing, last, excess);
                     (work.row_last[row], work.row_excess[row]) = (carrying, excess + (last - carrying));
                 }
             }
-            is_done &= Self::follow(tile);
+            is_done &= Self::follow::<GAPS>(tile);
             if is_done {
                 return Self::finish(tile);
             }
@@ -160,7 +169,7 @@ pub(crate) trait TwoParts {
 
     /// Computes the tangents of all laws at the current forces.
     #[inline(always)]
-    fn tangents<V: Simd>(tile: &mut Tile<'_>) {
+    fn tangents<V: Simd, const GAPS: bool>(tile: &mut Tile<'_>) {
         let (len, work) = (tile.len(), &mut tile.work);
         let (a, b, arm) = (&work.unit[..len], &work.growth[..len], &tile.torque.wave_generator[..len]);
         let (reach, pressed, force) = (&work.reach[..len], &work.pressed[..len], &tile.scale[..len]);
@@ -171,7 +180,7 @@ pub(crate) trait TwoParts {
             let at_force = beyond + rest;
             let both = 1.0 / (at_force * beyond);
             let per_slope = both * at_force;
-            let is_pressed = pressed[i] > 0.0;
+            let is_pressed = !GAPS || pressed[i] > 0.0;
             slope[i] = if is_pressed { arm[i] * per_slope } else { 0.0 };
             offset[i] = if is_pressed { -(rest * force[i]) * per_slope } else { 0.0 };
             secant[i] = both * beyond;
@@ -182,9 +191,9 @@ pub(crate) trait TwoParts {
     /// Updates the forces to the new rotations, and stores the former ones in place of the secants. Returns true if that
     /// was the last step.
     #[inline(always)]
-    fn follow(tile: &mut Tile<'_>) -> bool {
+    fn follow<const GAPS: bool>(tile: &mut Tile<'_>) -> bool {
         // A tooth that was pressed before has a slope.
-        press(tile);
+        press::<GAPS>(tile);
         let (len, work) = (tile.len(), &mut tile.work);
         let (arm, pressed) = (&tile.torque.wave_generator[..len], &work.pressed[..len]);
         let (slope, offset) = (&work.slope[..len], &work.offset[..len]);
@@ -199,9 +208,9 @@ pub(crate) trait TwoParts {
                 let by_chord = arm[i] * pressed[i] * secant[i];
                 let next = if by_tangent > 0.5 * by_chord { by_tangent } else { by_chord };
                 let next = if next > NOTHING { next } else { NOTHING };
-                let is_pressed = pressed[i] > 0.0;
+                let is_pressed = !GAPS || pressed[i] > 0.0;
                 let next = if is_pressed { next } else { before };
-                let has_changed = is_pressed != (slope[i] > 0.0) && arm[i] > 0.0;
+                let has_changed = GAPS && is_pressed != (slope[i] > 0.0) && arm[i] > 0.0;
                 let step = (next - before).abs() - LAST_FORCE_STEP * before - f64::EPSILON * f64::EPSILON;
                 let step = if has_changed { 1.0 } else { step };
                 force[i] = next;
