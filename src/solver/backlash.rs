@@ -288,11 +288,8 @@ impl<'a> Flanks<'a> {
         self.mesh.list(places, lap, &mut runs);
         let apart = self.mesh.laps_of_load_period();
         let of_run = |run: &Neighbours| {
-            let run = *run;
-            (0..run.count).map(move |tooth| Tooth {
-                spacings: run.first_place + apart * tooth,
-                place: self.mesh.place_of(&run, tooth),
-            })
+            let (first_place, places) = (run.first_place, self.mesh.places_of(run));
+            (0..run.count).zip(places).map(move |(tooth, place)| Tooth { spacings: first_place + apart * tooth, place })
         };
         runs.iter().flat_map(of_run).collect()
     }

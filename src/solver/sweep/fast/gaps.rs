@@ -118,6 +118,7 @@ impl Deviating {
         }
     }
 
+    #[inline(always)]
     fn item(&self, &Place { slot, ring_space, lobe }: &Place) -> Item {
         let (slot, space) = (&self.slots[whole(slot)], &self.spaces[whole(ring_space)]);
         let lobe = &self.lobes[whole(lobe)];
@@ -172,8 +173,8 @@ impl<'a> GapColumns<'a> {
         let Self::Unlike(unlike) = self else { return true };
         let Some(deviating) = &unlike.deviating else { return true };
         for run in &teeth.listed {
-            for (at, tooth) in run.at.clone().zip(0..) {
-                let item = deviating.item(&mesh.place_of(&run.teeth, tooth));
+            for (at, place) in run.at.clone().zip(mesh.places_of(&run.teeth)) {
+                let item = deviating.item(&place);
                 tile.gaps.items.iter_mut().zip(item).for_each(|(column, value)| column[at] = value);
             }
         }
@@ -300,7 +301,7 @@ impl<'a> UnlikeGaps<'a> {
         tile.work.closing[tile.count..len].fill(f64::INFINITY);
         let mut in_doubt = 0.0;
         for row in 0..rows {
-            let at = tile.of_row(row);
+            let at = row * count..(row + 1) * count;
             let (arm, ring_ratio) = (&tile.torque.wave_generator[at.clone()], &tile.force.ring[at.clone()]);
             let carrier_ratio = &tile.force.carrier[at.clone()];
             let (along, per_arm) = (&gaps.along[at.clone()], &gaps.per_arm[at.clone()]);

@@ -98,7 +98,7 @@ impl<'a> ColumnSink<'a> {
         }
         let mut at = start;
         for run in &lap.listed {
-            let Place { slot, lobe, .. } = laps.mesh.place_of(&run.teeth, 0);
+            let Place { slot, lobe, .. } = laps.mesh.place(run.teeth.first_slot, run.teeth.lobe);
             let of_run = at..at + run.at.len();
             let numbers = u32::try_from(slot).unwrap_or(u32::MAX)..;
             states.tooth[of_run.clone()].iter_mut().zip(numbers).for_each(|(tooth, number)| *tooth = number);

@@ -73,7 +73,7 @@ pub(crate) trait Power {
             let at = tile.of_row(row);
             let (arm, unit) = (&tile.torque.wave_generator[at.clone()], &tile.work.unit[at.clone()]);
             let mut of_unit = 0.0;
-            for i in 0..tile.teeth {
+            for i in 0..arm.len() {
                 of_unit += arm[i] * unit[i];
             }
             let share = torque_nmm / of_unit;
@@ -89,12 +89,12 @@ pub(crate) trait Power {
     /// Newton's method from above, with the tangents of all forces.
     #[inline(always)]
     fn share_beyond_gaps<V: Simd>(&self, torque_nmm: f64, tile: &mut Tile<'_>) -> bool {
-        let (rows, count, inverse) = (tile.rows(), tile.teeth, 1.0 / Self::EXPONENT);
+        let (rows, inverse) = (tile.rows(), 1.0 / Self::EXPONENT);
         for row in 0..rows {
             let at = tile.of_row(row);
             let (arm, unit) = (&tile.torque.wave_generator[at.clone()], &tile.work.unit[at.clone()]);
             let mut of_unit = 0.0;
-            for i in 0..count {
+            for i in 0..arm.len() {
                 of_unit += arm[i] * unit[i];
             }
             let alone = self.power::<V>(torque_nmm / of_unit);
@@ -112,7 +112,7 @@ pub(crate) trait Power {
                 let (slope, arm) = (&work.slope[at.clone()], &tile.torque.wave_generator[at.clone()]);
                 let pressed = &work.pressed[at.clone()];
                 let (mut torque, mut stiffness) = (0.0, 0.0);
-                for i in 0..count {
+                for i in 0..arm.len() {
                     let tangent = arm[i] * slope[i];
                     stiffness += tangent;
                     torque += if pressed[i] > 0.0 { tangent * pressed[i] } else { 0.0 };
@@ -290,7 +290,7 @@ fn share_linearly(torque_nmm: f64, tile: &mut Tile<'_>) -> bool {
         let mut last = last_of(closing);
         let (stiffness, excess) = loop {
             let (mut stiffness, mut before) = (0.0, 0.0);
-            for i in 0..tile.teeth {
+            for i in 0..arm.len() {
                 let of_tooth = arm[i] * unit[i];
                 stiffness += if closing[i] <= last { of_tooth } else { 0.0 };
                 before += if closing[i] <= last { of_tooth * (last - closing[i]) } else { 0.0 };

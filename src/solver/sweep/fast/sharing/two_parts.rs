@@ -55,7 +55,7 @@ pub(crate) trait TwoParts {
             let (at, work) = (tile.of_row(row), &mut tile.work);
             let (arm, secant) = (&tile.torque.wave_generator[at.clone()], &work.secant[at.clone()]);
             let mut stiffness = 0.0;
-            for i in 0..tile.teeth {
+            for i in 0..arm.len() {
                 stiffness += arm[i] * secant[i];
             }
             let alone = torque / stiffness;
@@ -146,7 +146,7 @@ pub(crate) trait TwoParts {
                 let (arm, closing) = (&tile.torque.wave_generator[at.clone()], &work.closing[at]);
                 let (mut stiffness, mut of_offset) = (0.0, 0.0);
                 let last = work.row_last[row];
-                for i in 0..tile.teeth {
+                for i in 0..arm.len() {
                     stiffness += arm[i] * slope[i];
                     let before = if GAPS && slope[i] > 0.0 { (last - closing[i]) * slope[i] } else { 0.0 };
                     of_offset += arm[i] * (offset[i] + before);
