@@ -441,7 +441,6 @@ impl Mesh {
     }
 
     /// Returns the places of the teeth of such a run among the items. Sums are faster than divisions for each tooth.
-    #[inline(always)]
     pub(crate) fn places_of(&self, run: &Neighbours) -> impl Iterator<Item = Place> + use<> {
         let Self { installed, ring_teeth, removal, .. } = *self;
         let wrapped = |sum: u64, count: u64| if sum < count { sum } else { sum - count };
