@@ -11,7 +11,6 @@ BY_DEFAULT = "default"  # a choice that the document leaves to the service
 FLAGS = {"yes": True, "no": False}
 SWITCHES = ("ring_teeth_bend", "wave_generator_moves", "corner_contact")  # deprecated, of the model
 LOBES = {"ellipse": 2, "eccentric": 1}  # of other kinds they are a field
-OF_LINES = ("linear", "palmgren", "johnson")  # laws of line contacts alone
 PROJECTED = ("linear", "palmgren", "fixed")  # the laws that `projection` takes
 
 # The fields of each kind, by the place of what comes in kinds. A kind or field without an entry below has its name in the document.
@@ -425,7 +424,7 @@ def suited(values, chosen):
         count, lobes = values["ToothCount"], LOBES.get(values["WaveGeneratorKind"], values["Lobes"])
         return {"RingTeeth": count + (lobes if values["RingTeeth"] > count else -lobes)}
     is_ball, law, way = values["ToothShape"] == "ball", values["StiffnessLaw"], values["Compatibility"]
-    if law in (OF_LINES if is_ball else ("hertz",)):
+    if law not in (BY_DEFAULT, "fixed") and is_ball != (law == "hertz"):
         law = BY_DEFAULT
     if way == "projection" and (law not in (BY_DEFAULT, *PROJECTED) or is_ball and law != "fixed"):
         law, way = (BY_DEFAULT, way) if chosen == "Compatibility" and not is_ball else (law, "virtual_work")

@@ -32,9 +32,6 @@ export const RIM = 1.2;
 
 export const outerRadiusOf = (design, { ring }) => at(design, '/parts/ring/outer_radius_mm') ?? RIM * (ring.root_radius_mm + (at(design, '/parts/ring/clearance_um') ?? 0) / 1000);
 
-/** Laws of line contacts alone. */
-const OF_LINES = new Set(['linear', 'palmgren', 'johnson']);
-
 /** Laws that `projection` takes. */
 const PROJECTED = new Set(['linear', 'palmgren', 'fixed']);
 
@@ -63,9 +60,9 @@ export function sizeOf(design) {
   return { mean: tidy(mean), stroke: tidy(stroke), low: tidy(mean - stroke), high: tidy(mean + stroke), path: tidy(mean + toothRadius) };
 }
 
-/** Laws suit shapes: balls have none of `OF_LINES`, others not Hertz's; a law outside `PROJECTED` needs virtual work. */
+/** Laws suit shapes: balls have Hertz's, and only they; a law outside `PROJECTED` needs virtual work. */
 export function withLaw(design) {
-  const isSuited = isBall(design) ? !OF_LINES.has(lawOf(design)) : lawOf(design) !== 'hertz';
+  const isSuited = lawOf(design) === 'fixed' || isBall(design) === (lawOf(design) === 'hertz');
   const suited = isSuited ? design : changed(design, '/model/stiffness', undefined);
   return !PROJECTED.has(lawOf(suited)) ? changed(suited, '/model/compatibility', 'virtual_work') : suited;
 }

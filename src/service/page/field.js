@@ -28,10 +28,11 @@ export function nameOf(pointer, groups) {
 export const kindName = (pointer, value) => textOf(`option.${pointer}.${value}`) ?? capital(value.replaceAll('_', ' '));
 
 /** The kinds that have no entry in the form, with the fields that the API document gives them. */
-const otherKinds = (pointer, options) => {
+const otherKinds = (pointer, options, suits) => {
   const listed = new Set(options.map(({ value }) => value));
   return Object.entries(KINDS[pointer]).filter(([value]) => !listed.has(value)).map(([value, fields]) => ({
     value,
+    suits,
     label: kindName(pointer, value),
     fields: fields.map(({ pointer: place, unit, choices, is_whole: isWhole, is_required: isRequired }) => {
       const own = { label: textOf(`label.${place}`) ?? nameOf(place, 2).label };
@@ -49,7 +50,7 @@ export const unlessSaid = (pointer, options) => choice(pointer, [{ value: '', la
 /** What a document says with `true`, or, where it `starts` with an object, by having that object. */
 export const flag = (pointer, more) => ({ kind: 'flag', pointer, label: label(pointer), ...more });
 export const variant = (pointer, tag, options, more = {}) => ({
-  kind: 'variant', pointer, tag, label: label(pointer), name: textOf(`name.${pointer}`), options: [...withLabels(pointer, options), ...otherKinds(pointer, options)], ...more,
+  kind: 'variant', pointer, tag, label: label(pointer), name: textOf(`name.${pointer}`), options: [...withLabels(pointer, options), ...otherKinds(pointer, options, more.othersSuit)], ...more,
 });
 /** An object with exactly one of several fields. */
 export const oneOf = (pointer, options, more) => ({ kind: 'oneOf', pointer, label: label(pointer), name: textOf(`name.${pointer}`), options: withLabels(pointer, options), ...more });

@@ -271,7 +271,7 @@ export const GROUPS = [
           value: 'fixed',
           fields: [stiffness('wave_generator', 'k_H'), stiffness('ring', 'k_K'), stiffness('carrier', 'k_S')],
         },
-      ], { otherwise: lawOf, adjust: withLaw }),
+      ], { otherwise: lawOf, adjust: withLaw, othersSuit: (design) => !isBall(design) }),
     ],
   },
   {
