@@ -103,8 +103,8 @@ impl CheckedSweep {
         estimates.into_iter().filter(|estimate| estimate.contact == Contact::Carrier).find_map(|finger| finger.share)
     }
 
-    /// Returns the loss totals over all points of a duty but for the life of a bearing, given the sweep of the hardest;
-    /// none without friction.
+    /// Returns the loss totals over all points of a duty, without the life of a bearing. Takes the sweep of the hardest
+    /// point. None without friction.
     pub fn loss_totals(&self, hardest: &solver::Sweep, stop: &dyn Stop) -> Result<Option<LossTotals>, SolveError> {
         let Some((costs, _)) = self.costs(hardest, None, stop)? else { return Ok(None) };
         let mut totals = self.losses_along(costs.totals(self.duty.hardest, &hardest.states));

@@ -37,7 +37,7 @@ pub struct DutyPoint {
     pub share_of_time: f64,
 }
 
-/// Loads of a duty cycle, none only if a document has no load.
+/// Loads of a duty cycle. It is empty if there is no load.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Duty {
     /// All loads.

@@ -3,9 +3,11 @@
 mod checks;
 mod peaks;
 mod states;
+mod totals;
 
 pub use checks::TorqueBalance;
 pub(crate) use checks::{checked, worse};
+pub(crate) use peaks::PeaksSoFar;
 pub use peaks::{ContactPeaks, Extremes, Peak, SweepPeaks, TorqueCapacity};
-pub(crate) use peaks::{PeaksSoFar, Totals};
 pub use states::{InputAngles, States, Sweep};
+pub(crate) use totals::Totals;
