@@ -131,7 +131,7 @@ pub(crate) trait TwoParts {
 
     /// Newton's method for all forces and the rotations together. Each force follows the tangent of its law, and the
     /// rotation is the one at which the tangents balance the torque. A round costs one logarithm or root for each
-    /// state. Without gaps every tooth carries: compiled apart, it takes a sixth to a quarter less time.
+    /// state. Without gaps every tooth carries: compiled apart, it takes an eighth to a quarter less time.
     #[inline(always)]
     fn share_with<V: Simd, const GAPS: bool>(torque: f64, tile: &mut Tile<'_>) -> bool {
         if !Self::start::<V, GAPS>(torque, tile) {
